@@ -189,16 +189,16 @@ _E, _K = Encoding, Kind
 UNDEFINED = "UNDEFINED"
 
 
+#: S, Rn and Rd where they are no fields: CMP and its like have no Rd and always set flags, MOV and MVN have no Rn.
+_FIXED = dict.fromkeys(("TST", "TEQ", "CMN", "CMP"), ("1", "nnnn", "1111")) | dict.fromkeys(
+    ("MOV", "MVN"), ("s", "1111", "dddd")
+)
+
+
 def _data(opcode: str, name: str, operands: str) -> tuple[Encoding, ...]:
     """Return a data-processing instruction with a modified immediate, and with a shifted register (A5.3.1, A5.3.11)."""
     operation = name.partition(" ")[0]
-    fixed = {"0": "1111", "1": "0000"}
-    # CMP and its like have no Rd and always set flags; MOV and MVN have no Rn.
-    sets, rn, rd = "s", "nnnn", "dddd"
-    if operation in {"TST", "TEQ", "CMN", "CMP"}:
-        sets, rd = "1", fixed["0"]
-    elif operation in {"MOV", "MVN"}:
-        rn = fixed["0"]
+    sets, rn, rd = _FIXED.get(operation, ("s", "nnnn", "dddd"))
     suffix = "" if sets == "1" else "{S}"
     return (
         _E(

@@ -186,11 +186,13 @@ def encodings_header() -> str:
     rows = (*NARROW, *WIDE)
     names = [name for name in dict.fromkeys(row.operation for row in rows) if name != UNDEFINED]
     forms = {_form(row): _extraction(row) for row in rows}
+    gives_up = [str(kind in GIVEN_UP).lower() for kind in Kind]
     lines = [
         f"/* {SOURCE / 'interpreter' / 'encodings.h'}: every encoding; made from extension/encodings.py. */",
         "#ifndef BLUEPILL_ENCODINGS_H",
         "#define BLUEPILL_ENCODINGS_H",
         "",
+        "#include <stdbool.h>",
         "#include <stdint.h>",
         "",
         *wrap(f"enum operation {{ {UNDEFINED}, {', '.join(names)} }};", _WIDTH, subsequent_indent=" " * 4),
@@ -199,7 +201,7 @@ def encodings_header() -> str:
         *wrap(f"enum kind {{ {', '.join(map(_kind, Kind))} }};", _WIDTH, subsequent_indent=" " * 4),
         f"static const uint8_t kind_cycles[] = {{{', '.join(str(CYCLES[kind]) for kind in Kind)}}};",
         f"static const uint8_t kind_refill[] = {{{', '.join(str(REFILL.get(kind, 0)) for kind in Kind)}}};",
-        f"static const uint8_t kind_gives_up[] = {{{', '.join(str(int(kind in GIVEN_UP)) for kind in Kind)}}};",
+        *wrap(f"static const bool kind_gives_up[] = {{{', '.join(gives_up)}}};", _WIDTH, subsequent_indent=" " * 4),
         "",
         "/* Where an instruction has its fields, as the table of encodings draws it. */",
         *wrap(f"enum form {{ {', '.join(forms)} }};", _WIDTH, subsequent_indent=" " * 4),

@@ -58,7 +58,6 @@ static void drop_part(struct interpreter *s, struct block **at)
 /* Drops the blocks of which something stands from `first` up to before `end`: they live until no run is in them. */
 void interpreter_drop(struct interpreter *s, uint64_t first, uint64_t end)
 {
-    bool has_dropped = false;
     for (struct block **at = &s->all; *at != NULL;) {
         struct block *block = *at;
         if (block->start >= end || block->end <= first) {
@@ -78,11 +77,8 @@ void interpreter_drop(struct interpreter *s, uint64_t first, uint64_t end)
         block->next = s->dropped;
         forget(block);
         s->dropped = block;
-        has_dropped = true;
     }
-    if (has_dropped) {
-        forget_links(s);
-    }
+    forget_links(s);
     for (uint32_t n = 0; n < PART_SLOTS; ++n) {
         if (s->parts[n] != NULL && s->parts[n]->start < end && s->parts[n]->end > first) {
             drop_part(s, &s->parts[n]);

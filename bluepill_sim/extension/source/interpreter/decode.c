@@ -9,7 +9,8 @@
 
 #include "lower.h"
 
-enum { FIRST_WIDE = 0xE800, ARM_STATE_BYTES = 4, ALWAYS = 14, MOST_OPS = PAGE_BYTES / 2 * MOST_OPS_EACH };
+enum { FIRST_WIDE = 0xE800, NARROW_BYTES = 2, ARM_STATE_BYTES = 4, ALWAYS = 14 };
+enum { MOST_OPS = PAGE_BYTES / NARROW_BYTES * MOST_OPS_EACH };
 
 static uint32_t halfword(const uint8_t *code) { return code[0] | (uint32_t)code[1] << 8; }
 
@@ -70,7 +71,7 @@ static enum outcome add(struct interpreter *s, struct builder *to, uint32_t word
 static bool leaves_page(uint32_t page, uint32_t at, const uint8_t *code)
 {
     const uint32_t in_page = at - page;
-    return in_page >= PAGE_BYTES || (in_page == PAGE_BYTES - 2 && halfword(code) >= FIRST_WIDE);
+    return in_page >= PAGE_BYTES || (in_page == PAGE_BYTES - NARROW_BYTES && halfword(code) >= FIRST_WIDE);
 }
 
 /* Decodes the block at an address, of which so many bytes are there; null: not even one instruction is. */
@@ -93,10 +94,10 @@ struct block *interpreter_decode(struct interpreter *s, uint32_t address, const 
         outcome = ENDS_BLOCK;
     }
     const uint32_t page = address & ~(uint32_t)(PAGE_BYTES - 1);
-    while (outcome == GOES_ON) {
-        const uint32_t first = bytes - done >= 2 ? halfword(code + done) : 0;
+    while (outcome == GOES_ON && bytes - done >= NARROW_BYTES) {
+        const uint32_t first = halfword(code + done);
         const bool is_wide = first >= FIRST_WIDE;
-        const uint32_t size = is_wide ? 4 : 2;
+        const uint32_t size = is_wide ? 2 * NARROW_BYTES : NARROW_BYTES;
         if (bytes - done < size) {
             break;
         }
@@ -106,7 +107,7 @@ struct block *interpreter_decode(struct interpreter *s, uint32_t address, const 
         to.it = to.after;
         to.next = 0;
         done = to.end - address;
-        if (outcome == GOES_ON && (bytes - done < 2 || leaves_page(page, to.end, code + done))) {
+        if (outcome == GOES_ON && (bytes - done < NARROW_BYTES || leaves_page(page, to.end, code + done))) {
             emit(&to, OP_STRAIGHT_ON);
             outcome = ENDS_BLOCK;
         }

@@ -2,6 +2,7 @@
 #ifndef BLUEPILL_ENCODINGS_H
 #define BLUEPILL_ENCODINGS_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 enum operation { UNDEFINED, MOVS_T2, LSL_T1, LSR_T1, ASR_T1, ADD_R3, SUB_R3, ADD_I3, SUB_I3, MOV_I8, CMP_I8, ADD_I8,
@@ -29,7 +30,9 @@ enum kind { KIND_PLAIN, KIND_MULTIPLY_ACCUMULATE, KIND_MULTIPLY_LONG, KIND_MULTI
     KIND_BREAKPOINT };
 static const uint8_t kind_cycles[] = {1, 2, 4, 5, 7, 2, 2, 2, 1, 2, 1, 1, 1, 1, 2, 1, 1, 1, 1, 2, 1, 1, 4, 1, 1, 1, 1, 1, 1, 1};
 static const uint8_t kind_refill[] = {0, 0, 0, 0, 0, 0, 0, 3, 0, 0, 3, 0, 0, 0, 0, 1, 1, 2, 3, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
-static const uint8_t kind_gives_up[] = {0, 0, 1, 1, 1, 0, 0, 0, 0, 0, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
+static const bool kind_gives_up[] = {false, false, true, true, true, false, false, false, false, false, true, true,
+    false, false, false, false, false, false, false, false, false, false, false, false, false, false, false, false,
+    false, false};
 
 /* Where an instruction has its fields, as the table of encodings draws it. */
 enum form { FORM_mmmddd, FORM_iiiiimmmddd, FORM_mmmnnnddd, FORM_iiinnnddd, FORM_dddiiiiiiii, FORM_nnnddd,

@@ -61,7 +61,6 @@ static __attribute__((noinline)) struct block *enter(struct interpreter *s, stru
             } else {
                 s->is.block_start = 0;
             }
-            s->is.it_state = 0;
             return block;
         }
         link = NULL;

@@ -129,8 +129,8 @@ void interpreter_unhook(struct interpreter *s, size_t number)
 {
     for (uint32_t n = 0; n < s->hook_count; ++n) {
         if (s->hooks[n].number == number) {
-            memmove(&s->hooks[n], &s->hooks[n + 1], (s->hook_count - n - 1) * sizeof s->hooks[0]);
             --s->hook_count;
+            memmove(&s->hooks[n], &s->hooks[n + 1], (s->hook_count - n) * sizeof s->hooks[0]);
             break;
         }
     }

@@ -32,7 +32,7 @@ enum { SHIFTED = 16, ADDRESS, REGISTERS };
 
 /* Unicorn's numbers: kinds of accesses, of hooks, of what an instruction ends a run with, and errors (unicorn.h). */
 enum { ON_READ = 16, ON_WRITE = 17, ON_FETCH = 18 };
-enum { BAD_READ = 19, BAD_WRITE, BAD_FETCH, PROTECTED_WRITE, PROTECTED_READ, PROTECTED_FETCH };
+enum { BAD_READ = 19, BAD_WRITE, BAD_FETCH, PROTECTED_WRITE, PROTECTED_READ };
 enum { HOOK_INTERRUPT = 1, HOOK_INSTRUCTION = 4, HOOK_BLOCK = 8, HOOK_BAD_ACCESS = 0x3F0, HOOK_ACCESS = 0xC00,
        HOOK_INVALID = 0x4000, HOOK_PAGE = 0x20000 };
 enum { BY_SVC = 2, BY_ABORT = 3, BY_ALIGNMENT = 4, BY_BKPT = 7, BY_RETURN = 8, BY_COPROCESSOR = 17 };

@@ -10,7 +10,7 @@
 
 enum { LSL_TYPE, LSR_TYPE, ASR_TYPE, ROR_TYPE };
 enum way { CONSTANT, OF_REGISTER, WITH_FLAGS, SHIFTED_REGISTER = 4 };
-enum { NO_REGISTER = 255 };
+enum { NO_REGISTER = 255, WORD_BYTES = 4 };
 
 /* The second operand: a constant, or a register. */
 struct operand {
@@ -37,7 +37,7 @@ static enum outcome undefined(struct builder *to)
 
 /* What a read of the PC gives. */
 static uint32_t read_pc(const struct builder *to) { return to->pc + 4; }
-static uint32_t aligned_pc(const struct builder *to) { return read_pc(to) & ~3u; }
+static uint32_t aligned_pc(const struct builder *to) { return read_pc(to) / WORD_BYTES * WORD_BYTES; }
 
 /* Before what reads these registers: R15 is one of them. */
 static void reads(struct builder *to, uint32_t first, uint32_t second)

@@ -7,7 +7,7 @@
 #include "interpreter.h"
 #include "micro.h"
 
-enum { MAY_READ = 1, MAY_WRITE = 2, MAY_EXECUTE = 4, WORD_BYTES = 4 };
+enum { MAY_READ = 1, MAY_WRITE = 2, WORD_BYTES = 4, FLASH_BASE = 0x08000000 };
 
 static bool contains(const struct region *region, uint32_t address)
 {
@@ -189,6 +189,9 @@ bool interpreter_store(struct interpreter *s, const struct op *op, uint32_t addr
     return true;
 }
 
+/* So many bytes of a region may begin an access of a word. */
+static uint32_t words_end(const struct region *region) { return region->last - region->first + 2 - WORD_BYTES; }
+
 /* Finds out what loads and stores may do at once: nothing is to hear of them, and every page is where it is. */
 void interpreter_choose_ways(struct interpreter *s)
 {
@@ -196,18 +199,14 @@ void interpreter_choose_ways(struct interpreter *s)
     s->sram = s->flash = NULL;
     for (uint32_t n = 0; n < s->region_count && !s->access_hooks && !s->finds_pages; ++n) {
         struct region *region = &s->regions[n];
-        const uint32_t bytes = region->last - region->first + 1;
-        if (region->host == NULL || bytes < WORD_BYTES) {
-            continue;
-        }
-        if (region->is_writable && s->sram == NULL) {
+        if (region->host != NULL && region->is_writable && s->sram == NULL) {
             s->sram = region->host;
             s->sram_base = region->first;
-            s->sram_words_end = bytes - (WORD_BYTES - 1);
-        } else if (!region->is_writable && region->first >> 24 == 8) {
+            s->sram_words_end = words_end(region);
+        } else if (!region->is_writable && region->first == FLASH_BASE) {
             s->flash = region->host;
             s->flash_base = region->first;
-            s->flash_words_end = bytes - (WORD_BYTES - 1);
+            s->flash_words_end = words_end(region);
         }
     }
 }
@@ -245,8 +244,8 @@ int interpreter_unmap(struct interpreter *s, uint64_t address, size_t bytes)
     (void)bytes;
     for (uint32_t n = s->region_count; n-- > 0;) {
         if (s->regions[n].first == (uint32_t)address) {
-            memmove(&s->regions[n], &s->regions[n + 1], (s->region_count - n - 1) * sizeof s->regions[0]);
             --s->region_count;
+            memmove(&s->regions[n], &s->regions[n + 1], (s->region_count - n) * sizeof s->regions[0]);
             break;
         }
     }

@@ -1,13 +1,14 @@
 """The interpreter does what Unicorn does: single instructions of each encoding, sequences, IT blocks."""
 
 import random
-from itertools import islice
+from itertools import combinations, islice
 from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bluepill_sim.extension.encodings import Encoding, find
 from tests.bluepill_sim.core.interpreter.lockstep import (
     FLASH,
     FLASH_BYTES,
@@ -17,7 +18,9 @@ from tests.bluepill_sim.core.interpreter.lockstep import (
     SRAM_BYTES,
     Case,
     Lockstep,
+    any_value,
     flags_of,
+    is_open,
     made,
     places,
 )
@@ -38,6 +41,45 @@ def assert_same(lockstep: Lockstep, cases: list[Case]) -> None:
 def test_each_encoding_does_what_it_does_on_unicorn(lockstep: Lockstep, each: int) -> None:
     dice = random.Random(38 + each)
     assert_same(lockstep, [made(dice, [row]) for row in ROWS for _ in range(each)])
+
+
+def with_fields(row: Encoding, dice: random.Random, **fixed: int) -> Case | None:
+    """Return a case of an encoding with some of its fields as given; nothing where that is another, or left open."""
+    word = row.value | dice.getrandbits(32 if row.is_wide else 16) & ~row.mask & (
+        0xFFFF_FFFF if row.is_wide else 0xFFFF
+    )
+    for letter, value in fixed.items():
+        above = value
+        for low, bits in reversed(row.fields[letter]):
+            word = word & ~(((1 << bits) - 1) << low) | (above & (1 << bits) - 1) << low
+            above >>= bits
+    if find(word, is_wide=row.is_wide) is not row or is_open(row, word):
+        return None
+    registers = [any_value(dice) for _ in range(15)]
+    registers[13] &= ~3
+    return Case((word,), tuple(registers), flags_of(dice), dice.getrandbits(4))
+
+
+def test_each_field_at_its_bounds_and_each_register_that_is_special_do_what_they_do_on_unicorn(
+    lockstep: Lockstep,
+) -> None:
+    """Numbers 0, 1, the largest and the next; R13, R15, and one register in two places; lists of none, one and all."""
+    dice = random.Random(41)
+    cases = []
+    for row in ROWS:
+        bits = {letter: sum(count for _, count in runs) for letter, runs in row.fields.items()}
+        registers = [letter for letter in "dnmta" if bits.get(letter) == 4]
+        wanted = [{letter: number} for letter in registers for number in (13, 15)]
+        wanted += [{one: 3, other: 3} for one, other in combinations(registers, 2)]
+        for letter in bits.keys() - {*"dnmtac"}:
+            most = (1 << bits[letter]) - 1
+            wanted += [{letter: number} for number in sorted({0, 1, most - 1, most} - {-1})]
+        if "r" in bits and "n" in bits:
+            lists = (0x01, 0x06, 0x08, 0x0C, 0x18, 0x09)  # R3, the base, is alone, first, last, or not there
+            wanted += [{"n": 3, "r": list_, **({"w": n} if "w" in bits else {})} for list_ in lists for n in (0, 1)]
+        cases += [case for each in wanted if (case := with_fields(row, dice, **each)) is not None]
+    assert len(cases) > 1200
+    assert_same(lockstep, cases)
 
 
 @pytest.mark.parametrize("count", SEQUENCES)

@@ -406,3 +406,21 @@ def test_nothing_is_lost_of_any_transfer_wherever_it_is_interrupted(boot: Boot, 
             registers = [board.register(f"R{n}") for n in range(13)] + [board.register("SP"), board.register("LR")]
             ends.append((registers, board.read_memory(WORDS, 0x200)))
         assert ends == ends[:1] * len(ends), (hex(first), hex(second))
+
+
+@pytest.mark.parametrize("pad", range(4))
+def test_a_load_of_r0_alone_begins_anew_however_long_the_next_fetch_takes(boot: Boot, pad: int) -> None:
+    """At 2 wait states it has cycles left when its only word is there: that is never moved before the exception."""
+    waits = "mov32 r6, #0x40022000\nmovs r0, #2\nstr r0, [r6, #0]\n"
+    is_within = 0
+    for behind in range(3, 10):
+        source = PROGRAM.format(
+            at=WORDS, base=WORDS, sp=STACK, load=1 + behind, it="nop\n" * pad, code=".half 0xCD01\nmov r8, r0", put=""
+        )  # fmt: skip
+        machine = boot(COUNTER_ON + waits + source, {SYSTICK: "tick"}).run(60)
+        pc, xpsr, _, base, *_ = machine.log
+        assert xpsr & 0x0EFF_FE00 == 0, "neither ICI nor what is no bit of it"
+        assert base == WORDS + 4 * (pc > machine.label("here")), behind
+        assert (machine.board.register("R8"), machine.board.register("R5")) == (1, WORDS + 4), behind
+        is_within += pc == machine.label("here")
+    assert is_within

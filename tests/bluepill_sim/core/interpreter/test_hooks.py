@@ -1,6 +1,7 @@
 """Whom the interpreter tells of what: hooks at the bounds of their ranges, one beside another, and full of them."""
 
 import ctypes
+from functools import partial
 
 import pytest
 
@@ -37,15 +38,15 @@ both = pytest.mark.parametrize("kind", [UnicornCore, InterpreterCore])
 @pytest.mark.parametrize("access", [LOAD, STORE])
 def test_an_access_is_told_to_the_hooks_in_whose_range_it_begins(kind: type[UnicornCore], access: str) -> None:
     core, _ = core_of(kind, access + BKPT)
-    heard: list[tuple[str, int, int, int]] = []
-    core.on_access(SRAM + 0x10, SRAM + 0x13, lambda what, at, size, _value: heard.append(("a", what, at, size)) or True)
-    core.on_access(SRAM + 0x13, SRAM + 0x13, lambda what, at, size, _value: heard.append(("b", what, at, size)) or True)
-    told = 16 if access == LOAD else 17
+    heard: list[tuple[str, int, int, int, int]] = []
+    core.on_access(SRAM + 0x10, SRAM + 0x13, lambda *seen: heard.append(("a", *seen)) or True)
+    core.on_access(SRAM + 0x13, SRAM + 0x13, lambda *seen: heard.append(("b", *seen)) or True)
+    told, value = (16, 0) if access == LOAD else (17, 0xA5)
     for offset, names in ((0x0F, ""), (0x10, "a"), (0x12, "a"), (0x13, "ab"), (0x14, "")):
         heard.clear()
-        core.registers[Reg.R1] = SRAM + offset
+        core.registers[Reg.R0], core.registers[Reg.R1] = 0x9FA5, SRAM + offset
         core.start(FLASH | 1)
-        assert heard == [(name, told, SRAM + offset, 1) for name in names], offset
+        assert heard == [(name, told, SRAM + offset, 1, value) for name in names], offset
 
 
 @both
@@ -135,28 +136,33 @@ def test_the_size_of_an_instruction_is_told() -> None:
 
 
 def test_the_hooks_behind_one_that_stops_the_run_are_not_called() -> None:
-    """Of a block, an interrupt, an instruction and an access: the second hook does not hear of it."""
-    for add in ("on_block", "on_interrupt", "instruction", "access"):
+    """Of two hooks of a kind, the only ones that there are, the first hears of it, and the second does not."""
+    for add in ("on_block", "on_interrupt", "on_invalid", "on_bad_access", "instruction", "access"):
         core = InterpreterCore(_raise)
-        core.map_memory(FLASH, ctypes.create_string_buffer(bytes.fromhex(LOAD + BKPT).ljust(BYTES, b"\0")), "rx")
+        code = bytes.fromhex("00de" if add == "on_invalid" else LOAD + BKPT)  # UDF
+        core.map_memory(FLASH, ctypes.create_string_buffer(code.ljust(BYTES, b"\0"), BYTES), "rx")
         core.map_memory(SRAM, ctypes.create_string_buffer(BYTES), "rwx")
         core.registers[Reg.R1] = SRAM
         heard: list[int] = []
 
-        def hear(*_: int, core: InterpreterCore = core, heard: list[int] = heard) -> bool:
-            heard.append(1)
+        def hear(n: int, *_: int, core: InterpreterCore = core, heard: list[int] = heard) -> bool:
+            heard.append(n)
             core.stop()
             return True
 
-        for _ in range(2):
+        for n in range(2):
+            call = partial(hear, n)
             if add == "instruction":
-                core.hook_instructions(core.instruction_callback(hear), FLASH, FLASH)
+                core.hook_instructions(core.instruction_callback(call), FLASH, FLASH)
             elif add == "access":
-                core.on_access(SRAM, SRAM, hear)
+                core.on_access(SRAM, SRAM, call)
+            elif add == "on_bad_access":
+                core.registers[Reg.R1] = 0x3000_0000
+                core.on_bad_access(call)
             else:
-                getattr(core, add)(hear)
+                getattr(core, add)(call)
         core.start(FLASH | 1)
-        assert heard == [1], add
+        assert heard == [0], add
 
 
 def test_there_is_room_for_so_many_hooks_and_regions_and_no_more() -> None:
@@ -173,8 +179,14 @@ def test_there_is_room_for_so_many_hooks_and_regions_and_no_more() -> None:
         core.map_memory(SRAM + BYTES * n, page, "rwx")
     with pytest.raises(Exception, match="map 0x"):
         core.map_memory(SRAM + BYTES * REGIONS, pages[-1], "rwx")
+    core._unmap(0x4000_0000, BYTES)  # nothing is there: nothing goes
+    with pytest.raises(Exception, match="map 0x"):
+        core.map_memory(SRAM + BYTES * REGIONS, pages[-1], "rwx")
     core._unmap(SRAM + BYTES * 3, BYTES)
     core.map_memory(SRAM + BYTES * REGIONS, pages[-1], "rwx")
+    core.remove_hook(max(hooks) + 1000)  # nor does a hook that there is not
+    with pytest.raises(RuntimeError, match="no room"):
+        core.on_bad_access(lambda *_: False)
 
 
 @both

@@ -196,6 +196,24 @@ def test_code_that_was_cut_and_has_changed_since_is_decoded_anew(
             assert board.register("R3") == done * code[0], (code, done)
 
 
+@pytest.mark.parametrize("core", ["own", "exact"])
+def test_a_block_that_was_dropped_is_not_gone_to_any_more(
+    boot: Boot, monkeypatch: pytest.MonkeyPatch, core: str
+) -> None:
+    """Two blocks that lead to each other, of which the second becomes another and the first stays."""
+    monkeypatch.setenv("P2OS_CORE", core)
+    machine = boot("movs r3, #0\nmovs r4, #0\nloop: adds r3, #1\nb far\nnop\nfar: adds r4, #1\nb loop\n")
+    board, far = machine.board, machine.label("far")
+    for change in (1, 2, 5, 1):  # ADDS R4, #change
+        ctypes.memmove(ctypes.addressof(board.chip.memory.flash) + far - FLASH, bytes([change, 0x34]), 2)
+        board.chip.engine.drop_code(far, 2)
+        before = [board.register(name) for name in ("R3", "R4")]
+        board.advance_to(board.now_ns + 300 * CYCLE_NS)
+        rounds, added = (board.register(name) - was for name, was in zip(("R3", "R4"), before, strict=True))
+        assert rounds > 30
+        assert abs(added - change * rounds) <= change, change
+
+
 def test_msr_of_a_stack_pointer_keeps_its_two_lowest_bits_0_by_itself(lockstep: Lockstep) -> None:
     """MSR MSP, R0 and MSR PSP, R0, and back into R1: on the bare core, which no owner helps."""
     for number in (8, 9):

@@ -236,9 +236,9 @@ def test_pages_are_asked_for_by_loads_where_views_are_mapped_and_else_by_fetches
     code = ctypes.create_string_buffer(bytes.fromhex("086800be").ljust(BYTES, b"\0"), BYTES)  # LDR R0, [R1]; BKPT
     core.map_memory(FLASH, code, "rx")
     core.map_memory(0x2000_0000, ctypes.create_string_buffer(BYTES), "rwx")
-    core.on_interrupt(lambda _number: core.stop())
     asked: set[int] = set()
     core.on_page(lambda address, kind: (asked.add(kind), (address, 7))[1])
+    core.on_interrupt(lambda _number: core.stop())
     core.registers[Reg.R1] = 0x2000_0000
     core.start(FLASH | 1)
     assert asked == {18}
