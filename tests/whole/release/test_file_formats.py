@@ -21,7 +21,7 @@ from robot_bench.scenario.loading import load_scenario
 from simbase.errors import FileError
 from simbase.files import VersionedFormat
 
-SAMPLES = Path(__file__).parents[1] / "golden" / "formats"
+SAMPLES = Path(__file__).parents[2] / "golden" / "formats"
 
 
 @dataclass(frozen=True)
