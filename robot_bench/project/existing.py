@@ -70,8 +70,8 @@ def preset_programs(folder: Path) -> list[str]:
             named = [(str(one["binaryDir"]), str(one.get("name", ""))) for one in presets if "binaryDir" in one]
         except (FileError, ValueError, AttributeError, TypeError, KeyError, RecursionError):
             continue  # it is not there, or CMake will say what is wrong with it
-        for told, preset in named:
-            place = told.replace("${sourceDir}/", "").replace("${presetName}", preset or "*")
+        for said, preset in named:
+            place = said.replace("${sourceDir}/", "").replace("${presetName}", preset or "*")
             place = _MACRO.sub("*", place).rstrip("/")
             if not Path(place).is_absolute() and ".." not in Path(place).parts:
                 found += [f"{place}/*.elf", f"{place}/*/*.elf"]
