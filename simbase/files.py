@@ -66,8 +66,8 @@ class VersionedFormat:
             raise error(f"{place}version = {shown(said)} is no version of {self.name}", hint=f"1 to {self.newest}")
         if said > self.newest:
             raise error(
-                f"{place}{self.name} of version {shown(said)}, and this p2os reads up to {self.newest}",
-                hint="install a newer p2os",
+                f"{place}{self.name} of version {shown(said)}, and this program reads up to {self.newest}",
+                hint="install a newer version",
             )
         return said
 

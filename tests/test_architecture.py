@@ -105,8 +105,8 @@ LOGGING = (
 #: The map of ARCHITECTURE.md, lowest first: a package imports none of its own row and none above it.
 LAYERS = {
     "simbase": (
-        ("timing", "state", "entry_points", "wire", "lazy", "interrupts", "listening", "terminal"), ("installation",),
-        ("errors",),
+        ("timing", "state", "entry_points", "wire", "interrupts", "listening", "terminal"), ("installation",),
+        ("errors", "lazy"),
         ("files", "units", "c_library"), ("trust",), ("user_classes",), ("command_line",),
     ),
     "p2os": (

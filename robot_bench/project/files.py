@@ -9,7 +9,7 @@ Invariant: a file that is there is never overwritten, and a project is written w
 import contextlib
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
@@ -160,7 +160,7 @@ def project_files(body: str, *, build: str = "make", robot: str = "p2dx") -> dic
         "@BUILD@": by.commands, "@PACKAGES@": by.packages, "@PIP@": by.pip,
     }  # fmt: skip
     templates = {**kind.templates, **by.templates, **_TEMPLATES}
-    found = {name: _text("robot_bench.project", f"template/{source}") for name, source in templates.items()}
+    found = {name: text_of_package("robot_bench.project", f"template/{source}") for name, source in templates.items()}
     if by.firmware != FIRMWARE:
         words[FIRMWARE] = by.firmware
     found = {name: _filled(text, words) for name, text in found.items()}
@@ -173,9 +173,9 @@ def project_files(body: str, *, build: str = "make", robot: str = "p2dx") -> dic
         found["README.md"] = _filled(_SH.sub(lambda _: by.readme, found["README.md"], count=1), by.words)
     if robot != "p2dx":
         found["README.md"] = _readme_of(found["README.md"])
-    found[SCENARIO] = _scenario(_text("robot_bench.scenarios", kind.scenario), body, by.firmware)
-    found |= {f"board/{name}": _text("robot_bench.firmware", name) for name in _SHIPPED}
-    found |= {name: _text("robot_bench.firmware", source) for name, source in kind.shipped.items()}
+    found[SCENARIO] = _scenario(text_of_package("robot_bench.scenarios", kind.scenario), body, by.firmware)
+    found |= {f"board/{name}": text_of_package("robot_bench.firmware", name) for name in _SHIPPED}
+    found |= {name: text_of_package("robot_bench.firmware", source) for name, source in kind.shipped.items()}
     if robot == "p2dx":
         found["board/wires.h"] = wires_header(load_pinout())
     return found
@@ -204,18 +204,32 @@ def wires_header(pinout: Pinout) -> str:
     return f"{_HEADER}{''.join(groups)}\n#endif\n"
 
 
-def write_project(folder: Path, contents: dict[str, str]) -> None:
+def write_project(folder: Path, contents: Mapping[str, str]) -> None:
     """Write a project's files into a folder that is new or empty.
 
     Raises:
         UsageError: The folder is not empty, is no folder, or has a name that make cannot take.
         FileError: It cannot be written; what was written of it is removed again.
     """
+    _refuse_names(_new_folders(folder))
+    write_files(folder, contents, refuse=_refuse_content)
+
+
+def write_files(folder: Path, contents: Mapping[str, str], refuse: Callable[[Path], None] = lambda _: None) -> None:
+    """Write files into a folder, none of which is there.
+
+    Args:
+        folder: Made where it is not there.
+        contents: The text of each file, by its path in the folder.
+        refuse: Called before anything is written; what it raises is raised.
+
+    Raises:
+        FileError: One cannot be written, or is there; what was written is removed again.
+    """
     new = _new_folders(folder)
-    _refuse_names(new)
     written: list[Path] = []
     try:
-        _refuse_content(folder)
+        refuse(folder)
         for path in new:
             path.mkdir()
             written.append(path)
@@ -235,7 +249,7 @@ def write_project(folder: Path, contents: dict[str, str]) -> None:
         raise
 
 
-def _in_folders(folder: Path, contents: dict[str, str], written: list[Path]) -> Iterator[tuple[Path, str]]:
+def _in_folders(folder: Path, contents: Mapping[str, str], written: list[Path]) -> Iterator[tuple[Path, str]]:
     for name, text in contents.items():
         path = folder / name
         for above in reversed([one for one in path.parents if not one.exists()]):
@@ -280,5 +294,6 @@ def _scenario(text: str, body: str, firmware: str) -> str:
     return text
 
 
-def _text(package: str, name: str) -> str:
+def text_of_package(package: str, name: str) -> str:
+    """Return the text of a file that is in a package."""
     return files(package).joinpath(name).read_text(encoding="utf-8")

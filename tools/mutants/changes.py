@@ -18,7 +18,12 @@ LANGUAGES = {
 #: Folders whose files are programs of the project: the rest are tests, tools, examples and what is generated.
 PACKAGES = ("simbase", "p2os", "bluepill_sim", "adapter_sim", "robot_bench", "adapter_fw/core", "hardware")
 #: Data that is code in its ending alone, and programs that run on a chip.
-LEFT_OUT = ("robot_bench/firmware/", "robot_bench/project/template/", "bluepill_sim/analysis/silicon/")
+LEFT_OUT = (
+    "robot_bench/firmware/",
+    "robot_bench/project/template/",
+    "robot_bench/project/beside/",
+    "bluepill_sim/analysis/silicon/",
+)
 
 Lines = Mapping[str, frozenset[int] | None]
 

@@ -98,7 +98,7 @@ def test_the_scenario_names_its_own_program_and_a_body_and_wants_nothing() -> No
         (["--", "-x"], "a folder called '-x' is not made\n"),
         (["a" * 300], "file name too long\n"),
         (["/proc/mine"], "cannot write /proc/mine: no such file or directory\n"),
-        ([], "Missing argument 'FOLDER'\nhint: p2os new --help\n"),
+        ([], "one folder is needed\nhint: p2os new my-robot, or p2os new --from a-project-of-yours\n"),
     ],
 )
 def test_what_cannot_be_is_one_line_and_a_hint_and_leaves_all_as_it_was(

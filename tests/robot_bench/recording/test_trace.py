@@ -238,7 +238,7 @@ def test_a_trace_that_was_cut_anywhere_within_a_block_is_read_up_to_the_line_bef
 
 def test_a_trace_of_a_later_version_is_refused_in_words(tmp_path: Path) -> None:
     (tmp_path / "trace.jsonl").write_text('{"k":"meta","trace":3}\n', encoding="utf-8")
-    with pytest.raises(TraceError, match=r"trace\.jsonl:1: a trace of version 3, and this p2os reads up to 2"):
+    with pytest.raises(TraceError, match=r"trace\.jsonl:1: a trace of version 3, and this program reads up to 2"):
         read_run(tmp_path)
 
 

@@ -95,7 +95,7 @@ def test_a_file_that_an_included_file_names_stands_beside_that_one(tmp_path: Pat
         (("posts", 'name = "p"', 'name = "q"'), "more.toml:2: [[obstacle]] 2: 'q' is placed at 1 s while it is there"),
         (
             ("base", "threshold_m = 0.4", "version = 9"),
-            "base.toml:5: a scenario of version 9, and this p2os reads up to 1",
+            "base.toml:5: a scenario of version 9, and this program reads up to 1",
         ),
         (("mine", '"base.toml"', '"basis.toml"'), "mine.toml:1: extends: there is no file 'basis.toml' beside it"),
         (("posts", "[[obstacle]]", "[[obstacle"), "posts.toml:2: "),

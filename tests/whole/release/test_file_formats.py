@@ -21,7 +21,7 @@ from robot_bench.scenario.loading import load_scenario
 from simbase.errors import FileError
 from simbase.files import VersionedFormat
 
-SAMPLES = Path(__file__).parents[1] / "golden" / "formats"
+SAMPLES = Path(__file__).parents[2] / "golden" / "formats"
 
 
 @dataclass(frozen=True)
@@ -119,8 +119,8 @@ def test_a_later_version_is_one_line_with_a_hint_and_exit_code_2(
     assert p2os([*kept.verb, str(named)]) == 2
     later = kept.format.newest + 1
     assert re.fullmatch(
-        rf"p2os: .*{kept.format.name} of version {later}, and this p2os reads up to {kept.format.newest}\n"
-        r"hint: install a newer p2os\n",
+        rf"p2os: .*{kept.format.name} of version {later}, and this program reads up to {kept.format.newest}\n"
+        r"hint: install a newer version\n",
         capsys.readouterr().err,
     )
 
@@ -134,7 +134,7 @@ def test_what_is_no_version_is_refused(said: object) -> None:
 def test_every_version_up_to_the_newest_is_one() -> None:
     form = VersionedFormat("a thing", newest=3)
     assert [form.version_of(said) for said in (None, 1, 2, 3)] == [1, 1, 2, 3]
-    with pytest.raises(FileError, match=r"^a thing of version 4, and this p2os reads up to 3"):
+    with pytest.raises(FileError, match=r"^a thing of version 4, and this program reads up to 3"):
         form.version_of(4)
 
 

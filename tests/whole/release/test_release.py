@@ -14,7 +14,7 @@ from robot_bench.scenario.included_files import SCENARIO
 
 yaml = pytest.importorskip("yaml")
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 #: Keys of the Citation File Format 1.2.0: required ones, and others that may stand at the top.
 REQUIRED = {"cff-version", "message", "title", "authors"}

@@ -20,7 +20,7 @@ from tests.tools.forked_python import PYTEST, forked_python
 
 yaml = pytest.importorskip("yaml")
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 GITHUB, GITLAB = ROOT / ".github", ROOT / ".gitlab" / "bench.yml"
 WORKFLOWS = sorted((GITHUB / "workflows").glob("*.yml"))
 ACTIONS = sorted((GITHUB / "actions").glob("*/action.yml"))
