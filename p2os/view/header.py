@@ -120,6 +120,49 @@ class RobotHeader:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class WordOffer:
+    """A word behind the name of a fault: one of `choices`, or a number."""
+
+    name: str
+    choices: Sequence[str] = ()
+    least: float = 0.0
+    most: float = 0.0
+    #: 1: whole numbers; 0: any.
+    step: float = 0.0
+    #: What it is at first.
+    usual: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FaultOffer:
+    """A fault that can be injected: `fault NAME WORD …`."""
+
+    name: str
+    doc: str
+    words: Sequence[WordOffer] = ()
+    #: It happens once: there is nothing to clear.
+    is_momentary: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HandsOffer:
+    """What hands can do in what is shown, beside moving its things."""
+
+    faults: Sequence[FaultOffer] = ()
+    #: Of the robot, to be pressed.
+    buttons: Sequence[str] = ()
+    #: Wires whose level can be held, pins whose volts can, and ports that can be typed into.
+    pins: Sequence[str] = ()
+    analog_pins: Sequence[str] = ()
+    ports: Sequence[str] = ()
+    #: How fast the robot is driven by a key that is held or a stick at its end, m/s and deg/s; 0: not at all.
+    most_mps: float = 0.0
+    most_dps: float = 0.0
+    #: A robot that is there: it can be driven and stopped, and nothing else.
+    is_real: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class PageCell:
     """A cell of a table."""
 
@@ -253,6 +296,8 @@ class PageHeader:
     channels: Sequence[ChannelHeader] = ()
     world: WorldHeader | None = None
     robots: Sequence[RobotHeader] = ()
+    #: What hands can do; None: nothing.
+    hands: HandsOffer | None = None
     sections: Sequence[PageSection] = ()
     #: A line for each kind of rows of which the page has not all.
     left_out: Sequence[str] = ()
@@ -296,7 +341,7 @@ class Answered:
 
 
 __all__ = [
-    "Answered", "ChannelHeader", "PageBlock", "PageCell", "PageCurve", "PageHeader", "PageList", "PagePicture",
-    "PagePlan", "PagePlot", "PageSection", "PageTable", "PageText", "RobotHeader", "SensorPlace", "Standing",
-    "StateTransition", "Wanted", "WorldHeader", "WorldThing",
+    "Answered", "ChannelHeader", "FaultOffer", "HandsOffer", "PageBlock", "PageCell", "PageCurve", "PageHeader",
+    "PageList", "PagePicture", "PagePlan", "PagePlot", "PageSection", "PageTable", "PageText", "RobotHeader",
+    "SensorPlace", "Standing", "StateTransition", "Wanted", "WordOffer", "WorldHeader", "WorldThing",
 ]  # fmt: skip

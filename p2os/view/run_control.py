@@ -6,24 +6,27 @@ page in TypeScript are made of these classes (`tools/generators/page_types.py`).
 Invariant: a command is one of `COMMANDS`, with the fields that its row names and no others.
 """
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol, TypeAlias, cast, get_args
 
-from simbase.timing import Nanos
+from simbase.timing import NS_PER_MS, Nanos
 
 #: What one step goes by.
 StepUnit: TypeAlias = Literal["instruction", "line", "edge", "packet", "event", "millisecond"]
 #: What is done.
 Doing: TypeAlias = Literal[
     "run", "pause", "go", "step", "back", "speed", "fork", "choose", "drop", "compare", "halt_at", "halt_not_at",
-    "watch", "watch_not",
+    "watch", "watch_not", "hand", "drive", "save",
 ]  # fmt: skip
 #: chosen: words of a person in one line.
 MOST_LETTERS = 400
 #: chosen: virtual seconds a second; 0 stands for as fast as it goes.
 SLOWEST, FASTEST = 0.01, 1000.0
+#: chosen: a robot that is driven stands when nothing was heard of who drives it for so long: three messages of a page.
+DRIVE_HOLD_NS: Nanos = 400 * NS_PER_MS
+#: More is no speed of a small robot, m/s and deg/s.
+MOST_MPS, MOST_DPS = 2.0, 360.0
 _MOST_NS = 2**62
 
 
@@ -37,12 +40,16 @@ class RunCommand:
     unit: StepUnit = "event"
     #: Virtual seconds a second; 0: as fast as it goes.
     speed: float = 1.0
-    #: Of `halt_at`: where; of `fork`: what is done there; of a step by edges: the wire; of `watch`: the variable.
+    #: Of `halt_at`: where; of `fork` and `hand`: what is done; of a step by edges: the wire; of `watch`: the variable;
+    #: of `save`: as what.
     words: str = ""
     #: A future's name; of `fork` the one that it leaves, empty: the chosen one.
     future: str = ""
     #: Of a place to halt at.
     number: int = 0
+    #: Of `drive`: m/s ahead, and degrees a second counter-clockwise. It has to come again and again (`DRIVE_HOLD_NS`).
+    forward_mps: float = 0.0
+    turn_dps: float = 0.0
 
 
 #: What is done → the fields that it may have.
@@ -57,6 +64,9 @@ COMMANDS: Mapping[str, frozenset[str]] = {
     "choose": frozenset({"future"}),
     "drop": frozenset({"future"}),
     "compare": frozenset({"future"}),
+    "hand": frozenset({"at_ns", "words"}),
+    "drive": frozenset({"forward_mps", "turn_dps"}),
+    "save": frozenset({"words"}),
     "halt_at": frozenset({"words"}),
     "halt_not_at": frozenset({"number"}),
     "watch": frozenset({"words"}),
@@ -72,6 +82,14 @@ class HaltState:
     words: str
     #: How often it was halted at.
     count: int = 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HandState:
+    """What a hand did, and when."""
+
+    at_ns: Nanos
+    words: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -128,6 +146,11 @@ class RunState:
     halts: Sequence[HaltState] = ()
     #: Names of the program's variables that are watched: each is a channel.
     variables: Sequence[str] = ()
+    #: How much was done by hand in the chosen future, and the last of it, the earliest first.
+    hand_count: int = 0
+    hands: Sequence[HandState] = ()
+    #: Where hands were written down, in a line.
+    saved: str = ""
 
 
 class RunControl(Protocol):
@@ -174,15 +197,19 @@ def _is_count(value: object) -> bool:
 
 
 def _is_speed(value: object) -> bool:
-    if not isinstance(value, int | float) or isinstance(value, bool) or not math.isfinite(value):
-        return False
-    return value == 0 or SLOWEST <= value <= FASTEST
+    return _is_within(value, FASTEST) and (value == 0 or value >= SLOWEST)  # type: ignore[operator]  # a number by now
+
+
+def _is_within(value: object, most: float) -> bool:
+    """Tell whether it is a number no further from 0 than that."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= most
 
 
 _CHECKS: Mapping[str, Callable[[object], bool]] = {
     "do": _is_text, "words": _is_text, "future": _is_text, "speed": _is_speed,
     "at_ns": _is_count, "number": _is_count,
+    "forward_mps": lambda value: _is_within(value, MOST_MPS), "turn_dps": lambda value: _is_within(value, MOST_DPS),
     "unit": lambda value: value in get_args(StepUnit),
 }  # fmt: skip
 
-__all__ = ["Doing", "FutureState", "HaltState", "PartingState", "RunCommand", "RunState", "StepUnit"]
+__all__ = ["Doing", "FutureState", "HaltState", "HandState", "PartingState", "RunCommand", "RunState", "StepUnit"]

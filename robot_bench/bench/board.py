@@ -10,11 +10,13 @@ from adapter_sim.pinout import Pinout, Pull, load_pinout
 from bluepill_sim.fabric.surroundings import Surroundings
 from bluepill_sim.parts.registry import attach
 from p2os.event_log import log_event, logger
+from p2os.pioneer.body.contract import RobotBody
 from p2os.toml_schema import placed, within
+from robot_bench.bench.hand_driven_body import hand_driven
 from robot_bench.direct.wired import AnalogPin, RobotWire
 from robot_bench.recording.recorder import Recorder
 from robot_bench.recording.transfers import hear_bus
-from robot_bench.scenario.hand_script import Action
+from robot_bench.scenario.hands.actions import WHEELS, Action
 from robot_bench.scenario.scenario import Scenario
 from robot_bench.wires.nets import Harness, Net, Strength
 from robot_bench.wires.ports import LeadingChip
@@ -129,9 +131,18 @@ def make_harness(pinout: Pinout) -> Harness:
     return harness
 
 
-def do_by_hand(action: Action, chip: LeadingChip, harness: Harness) -> None:
-    """Have a hand do something at the board, now."""
-    if action.do == "type":
+def do_by_hand(action: Action, chip: LeadingChip, harness: Harness, body: RobotBody) -> None:
+    """Have a hand do something, now.
+
+    Raises:
+        WorldError: The robot is carried to where there is no room.
+        UsageError: It is driven, and shares its world.
+    """
+    if action.pose is not None:
+        body.stand_at(action.pose.x_m, action.pose.y_m, action.pose.heading_rad)
+    elif action.place == WHEELS:
+        hand_driven(body).drive_by_hand(action.speeds)
+    elif action.do == "type":
         getattr(chip, action.place).receive(action.text)
     elif action.do == "set_volts":
         cast("AnalogPin", chip.pin(action.place)).set_volts(action.volts)

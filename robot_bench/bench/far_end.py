@@ -82,7 +82,8 @@ def make_far_end(
 def _refuse_faults(scenario: Scenario) -> None:
     where = scenario.where or scenario.name
     places = [within(where, "fault", 0)] if scenario.faults else []
-    places += [within(where, "when", number) for number, when in enumerate(scenario.triggers) if when.faults]
+    places += [within(where, "when", number) for number, when in enumerate(scenario.triggers) if when.doing.faults]
+    places += [within(where, "hand", number) for number, hand in enumerate(scenario.hands) if hand.doing.faults]
     if places:
         raise ScenarioError(
             f"{places[0]}: a fault acts on the robot's controller, and mode direct has none", hint="--mode adapter"

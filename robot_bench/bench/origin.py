@@ -18,8 +18,8 @@ VERSION = "version of p2os"
 #: What decides a run besides its files; its end and its goals may be others after a restart.
 DECISIVE = (
     "mode", "seed", "parameters", "threshold_um", "usart_baud", "outside", "start", "direct", "adapter",
-    "adapter_core", "controller", "controller_kind", "changes", "faults", "triggers", "own_robot", "parts", "record",
-    "sram", "crystal_ppm", "interrupt_latency_cycles",
+    "adapter_core", "controller", "controller_kind", "changes", "faults", "triggers", "hands", "own_robot", "parts",
+    "record", "sram", "crystal_ppm", "interrupt_latency_cycles",
 )  # fmt: skip
 #: Of these, what happens at times of its own: a part of it may be still to come.
 LATER = ("changes", "faults")

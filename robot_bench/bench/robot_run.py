@@ -7,7 +7,7 @@ Invariant: a run that was restored from a snapshot goes on as the one that the s
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import cast
 
@@ -31,6 +31,7 @@ from robot_bench.bench.board import (
     plug_in,
 )
 from robot_bench.bench.far_end import make_far_end
+from robot_bench.bench.hand_driven_body import HandDrivenBody
 from robot_bench.bench.origin import LATER, origin_of, refuse_others
 from robot_bench.bench.waiting import EventWait
 from robot_bench.direct.differential.robot import DifferentialRobot
@@ -44,7 +45,8 @@ from robot_bench.running.pacer import FIRST_SLICE_NS, SliceLength
 from robot_bench.running.shared_world import SharedRobot, SharedWorld
 from robot_bench.scenario.fault_script import LINK_DOWN, FaultScript
 from robot_bench.scenario.goals.judging import GoalJudge, Judgement, RunEnd
-from robot_bench.scenario.hand_script import Action, HandScript
+from robot_bench.scenario.hands.actions import Action, HandScript
+from robot_bench.scenario.hands.doing import Doing
 from robot_bench.scenario.loading import refuse_what_its_world_refuses
 from robot_bench.scenario.scenario import Scenario
 from robot_bench.scenario.trigger_script import TriggerScript
@@ -147,11 +149,9 @@ class RobotRun(Stateful):
         #: When a goal's verdict or a `[[when]]` ends the run; None while none does.
         self.ends_at: Nanos | None = None
         self._has_reported_death = False
-        self.triggers = TriggerScript(
-            scenario.triggers, on_end=self._end_at,
-            on_change=lambda changes: self.script.add(*changes), on_fault=lambda faults: self.faults.add(*faults),
-            on_action=lambda actions: self.hands.add(*actions),
-        )  # fmt: skip
+        self.triggers = TriggerScript(scenario.triggers, on_end=self._end_at, on_doing=self.schedule)
+        for hand in scenario.hands:
+            self.schedule(hand.doing)
         self.triggers.subscribe(self.events)
         self.goals = GoalJudge(scenario.goals)
         self.goals.on_end = lambda: self._end_at(self.loop.now)
@@ -281,7 +281,7 @@ class RobotRun(Stateful):
         if not isinstance(snapshot, PartState) or tuple(snapshot) != state_names(RobotRun):
             raise TypeError("not a snapshot of a bench")
 
-    def take_inputs(self, actions: Sequence[Action]) -> None:
+    def take_inputs(self, doing: Doing) -> None:
         """Take what comes in from outside, to be done at its times, which are after now; the trace notes each.
 
         `Bench.rewind` forgets what came in after the state that it goes back to.
@@ -291,7 +291,19 @@ class RobotRun(Stateful):
         """
         self.refuse_the_ended()
         self.waits.forget()
-        self.hands.add(*actions)
+        self.schedule(doing)
+
+    def take_back(self, doing: Doing) -> None:
+        """Forget what `schedule` has taken, as far as it is still to come."""
+        self.script.take_back(*doing.changes)
+        self.faults.take_back(*doing.faults)
+        self.hands.take_back(*doing.actions)
+
+    def schedule(self, doing: Doing) -> None:
+        """Have something done at its times."""
+        self.script.add(*doing.changes)
+        self.faults.add(*doing.faults)
+        self.hands.add(*doing.actions)
 
     def refuse_the_ended(self) -> None:
         """Refuse to change what has been finished.
@@ -341,7 +353,7 @@ class RobotRun(Stateful):
 
     def _do_by_hand(self, action: Action) -> None:
         self.recorder.event(action.who, action.at, action.do, action.words)
-        do_by_hand(action, self.chip, self.parts.harness)
+        do_by_hand(action, self.chip, self.parts.harness, self.parts.body)
 
     def _plug_in(self, chip: LeadingChip) -> tuple[WorldSenses, ...]:
         """Attach the scenario's parts to the board, and have them sense the world."""
@@ -364,5 +376,6 @@ class RunningBench(ABC):
 
 def body_of(scenario: Scenario, world: World) -> RobotBody:
     """Return the body of a scenario's robot alone in a world, standing where it begins."""
-    start = scenario.start or world.start
-    return make_body(scenario.body, world, scenario.parameters, start=start, seed=scenario.seed, trust=False)
+    start, robot = scenario.start or world.start, scenario.parameters
+    body = make_body(scenario.body, world, robot, start=start, seed=scenario.seed, trust=False)
+    return cast("RobotBody", HandDrivenBody(body, robot.track_mm / 1000))

@@ -17,7 +17,7 @@ from adapter_sim.pinout import WireRole, load_pinout
 from p2os.errors import ScenarioError
 from robot_bench.bench import Bench, run_of
 from robot_bench.campaign.trial import Trial, bench_of, unpacked
-from robot_bench.scenario.hand_script import Action
+from robot_bench.scenario.hands.actions import Action
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: chosen: how often the run is saved.

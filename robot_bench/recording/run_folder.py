@@ -25,9 +25,12 @@ from simbase.files import reason_of, refuse_elsewhere
 
 #: Where run folders go by default, in the current directory.
 RUNS = Path("runs")
+#: What was done by hand in a run, as a scenario that is that run without a page.
+HANDS_NAME = "hands.toml"
 #: All that a run leaves in its folder.
 FILES = (
-    TRACE_NAME, VARIABLES_NAME, SUMMARY_NAME, "report.html", "pins.vcd", "pins.sr", "wire.jsonl", "usart.txt",
+    TRACE_NAME, VARIABLES_NAME, SUMMARY_NAME, HANDS_NAME, "report.html", "pins.vcd", "pins.sr", "wire.jsonl",
+    "usart.txt",
     "path.png", "speeds.png", "pins.png",
     "coverage.txt", "coverage.html", "coverage.info", "profile.txt", "profile.folded", "profile.svg",
 )  # fmt: skip

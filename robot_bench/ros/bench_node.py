@@ -23,7 +23,7 @@ from p2os.ros.topics import TOPICS
 from p2os.ros.transport import NodeOptions, Received, Topic
 from p2os.ros.urdf import urdf_text
 from robot_bench.events.kinds import MICRO, Pose, Ranges
-from robot_bench.scenario.hand_script import Action
+from robot_bench.scenario.hands.actions import Action
 from simbase.timing import NS_PER_MS, Nanos
 
 #: Who did it, in the trace.

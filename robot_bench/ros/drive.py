@@ -17,6 +17,7 @@ from robot_bench.events.kinds import Pose, Ranges
 from robot_bench.ros.bench_node import BenchNode
 from robot_bench.ros.recorded import read_inputs
 from robot_bench.run import RunBench
+from robot_bench.scenario.hands.doing import Doing
 from robot_bench.scenario.scenario import Scenario
 from simbase.errors import UsageError, shown
 from simbase.timing import NS_PER_MS, Nanos
@@ -85,7 +86,7 @@ def with_inputs(path: Path) -> RunBench:
     inputs = read_inputs(path)
 
     def drive(bench: Bench) -> None:
-        run_of(bench).take_inputs(inputs)
+        run_of(bench).take_inputs(Doing(actions=tuple(inputs)))
         bench.run_until(bench.scenario.duration_ns)
 
     return drive
@@ -114,7 +115,8 @@ def run_beside(bench: Bench, network: RosTransport, options: NodeOptions) -> Non
                 network.publish(topic, message)
             outgoing.clear()
             if bench.now < bench.end:
-                run_of(bench).take_inputs(node.take(network.take(0.0), bench.now + 1))
+                taken = node.take(network.take(0.0), bench.now + 1)
+                run_of(bench).take_inputs(Doing(actions=tuple(taken)))
             if bench.now == before:  # a chip that stands still for good
                 return
     finally:

@@ -236,8 +236,7 @@ def _read(path: Path, folder: Path, above: tuple[Path, ...], count: list[int]) -
     place = TablePlace(TomlSource(name, places))
     own, _ = read_part(IncludeTable, table, place)
     table = {name: value for name, value in table.items() if name not in {"extends", "include"}}
-    for name_of, keys in FILES.items():
-        _look_beside(table, name_of, keys, path.parent, folder)
+    seen_from(table, path.parent, folder)
     found = _Read(table=table, parts=(_Part(TomlSource(name, places)),), texts=(f"{name}:\n{text}",))
     here = (*above, path)
     for other in reversed(own.include):
@@ -267,6 +266,12 @@ def _named(name: str, here: tuple[Path, ...], at: str, key: str) -> Path:
         circle = " includes ".join(shown_name(other.name) for other in (*here[same:], path))
         raise ScenarioError(f"{at}: {key}: {circle}", hint="a file cannot include itself")
     return path
+
+
+def seen_from(table: dict[str, object], there: Path, folder: Path) -> None:
+    """Name the files that a scenario's table names, and that stand beside it, as seen from another folder."""
+    for name_of, keys in FILES.items():
+        _look_beside(table, name_of, keys, there, folder)
 
 
 def _look_beside(table: dict[str, object], own: str, keys: Sequence[str], there: Path, folder: Path) -> None:

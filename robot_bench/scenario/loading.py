@@ -25,6 +25,7 @@ from robot_bench.events.selection import bus_of
 from robot_bench.scenario import plugged_parts
 from robot_bench.scenario.fault_script import load_faults
 from robot_bench.scenario.goals.judging import load_goal
+from robot_bench.scenario.hands.timed import load_hands
 from robot_bench.scenario.included_files import ScenarioTable, Setting, read_tables, shipped_file, shipped_scenarios
 from robot_bench.scenario.options import buses, is_of_users, known_code, listed, resolve_world, world_file
 from robot_bench.scenario.scenario import RobotPlace, Scenario
@@ -107,7 +108,7 @@ def _refuse_what_never_comes(found: ScenarioTable, path: Path, settings: Sequenc
     if "duration_s" in dict(settings):
         return
     longest_s = max(number_of(part, "duration_s") for part in (table, *(table_of(worlds, name) for name in worlds)))
-    for kind in ("obstacle", "fault"):
+    for kind in ("obstacle", "fault", "hand"):
         for number, item in enumerate(tables_of(table, kind)):
             if number_of(item, "at_s") >= longest_s:
                 raise ScenarioError(
@@ -214,6 +215,7 @@ def _build(table: Table, text: str, path: Path, where: TablePlace, firmware: Pat
         axes=load_axes(top.sweep or {}, where),
         faults=load_faults(top.fault, parameters, where),
         triggers=load_triggers(top.when, parameters, where, wires),
+        hands=load_hands(top.hand, parameters, where, wires),
         goals=goals,
         in_world={str(world_file(world, path.parent) or world): (world, part) for world, part in top.in_world.items()},
         where=where,

@@ -22,6 +22,7 @@ from p2os.toml_schema import Where, within
 from robot_bench.direct.robot import DirectSettings
 from robot_bench.scenario.fault_script import FaultChange
 from robot_bench.scenario.goals.judging import Goal
+from robot_bench.scenario.hands.timed import Hand
 from robot_bench.scenario.included_files import Setting
 from robot_bench.scenario.options import (
     ScenarioOptions,
@@ -106,6 +107,8 @@ class Scenario:
     changes: tuple[ScriptedChange, ...] = ()
     faults: tuple[FaultChange, ...] = ()
     triggers: tuple[Trigger, ...] = ()
+    #: What is done at times, in their order.
+    hands: tuple[Hand, ...] = ()
     goals: tuple[Goal, ...] = ()
     #: World, as `world` names it → as the file names it, and what is otherwise there.
     in_world: Mapping[str, tuple[str, InWorldTable]] = field(default_factory=dict)

@@ -37,7 +37,7 @@ _TOP = (
 MOST_ROBOTS = 16
 _NAME = re.compile(r"[A-Za-z_][\w.-]{0,31}", re.ASCII)
 #: Lists of a scenario whose tables may name a robot.
-OF_ROBOTS = ("goal", "fault", "when", "obstacle", "part")
+OF_ROBOTS = ("goal", "fault", "when", "hand", "obstacle", "part")
 
 
 @dataclass(frozen=True, slots=True)

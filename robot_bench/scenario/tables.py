@@ -1,7 +1,7 @@
 """The tables of a scenario file, a record each: the one declaration of every key with its type, range, default and use.
 
 Reader, JSON schema, page of keys (docs/scenarios.md) and completion are made of these. The tables of `[[obstacle]]`,
-`[[fault]]`, `[[when]]`, `[[part]]` and of each kind of `[[goal]]` stand beside what reads them.
+`[[fault]]`, `[[when]]`, `[[hand]]`, `[[part]]` and of each kind of `[[goal]]` stand beside what reads them.
 """
 
 import math
@@ -22,10 +22,12 @@ from robot_bench.direct.robot import DirectSettings
 from robot_bench.scenario.fault_script import FaultTable
 from robot_bench.scenario.goals.judging import GoalTable
 from robot_bench.scenario.goals.kinds import every_kind
+from robot_bench.scenario.hands.doing import ACTION_TABLES
+from robot_bench.scenario.hands.timed import HAND_TABLES, TimedHandTable
 from robot_bench.scenario.included_files import IncludeTable
 from robot_bench.scenario.plugged_parts import PartTable
 from robot_bench.scenario.sweep import LARGEST_SEED
-from robot_bench.scenario.trigger_script import ACTION_TABLES, WhenTable
+from robot_bench.scenario.trigger_script import WhenTable
 from robot_bench.scenario.world_script import ObstacleTable
 from robot_bench.wires.line_ends import ENDS
 from robot_bench.wires.power_up import RANDOM_SRAM, ZEROS
@@ -235,6 +237,10 @@ class TopTable(OwnTable, IncludeTable):
     when: Annotated[tuple[Table, ...], Key(
         variants=Variants("do", WhenTable, lambda: ACTION_TABLES), beside=(ROBOT,),
         doc="what is [done when something happens](#when-what-is-done-when-something-happens)",
+    )] = ()  # fmt: skip
+    hand: Annotated[tuple[Table, ...], Key(
+        variants=Variants("do", TimedHandTable, lambda: HAND_TABLES), beside=(ROBOT,),
+        doc="what is [done at a time](#hand-what-is-done-at-a-time)",
     )] = ()  # fmt: skip
     goal: Annotated[tuple[Table, ...], GOALS] = ()
 

@@ -52,6 +52,12 @@ class Timeline(Stateful, Generic[T]):
             self._changes = kept
             raise
 
+    def take_back(self, *changes: T) -> None:
+        """Forget those of some changes that were added and are still to come."""
+        kept, left = self._changes[: self._done], self._changes[self._done :]
+        gone = set(map(id, changes))
+        self._changes = (*kept, *(change for change in left if id(change) not in gone))
+
     def begun_as(self, saved: PartState, now: Nanos) -> PartState:
         """Return what another timeline saved at a time, with this one's changes to come in place of its own.
 

@@ -16,88 +16,21 @@ its event is reported is done then, up to 50 ms late.
 Invariant: when it is done depends on the events of the run alone, not on the slices of the loop.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Annotated, ClassVar
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Annotated
 
 from p2os.errors import ScenarioError
 from p2os.robots.parameters import RobotParameters
-from p2os.toml_record import Record, read, read_part
+from p2os.toml_record import Record, read_part
 from p2os.toml_schema import LONGEST_S, Key, Table, Where, placed, within
 from robot_bench.events.kinds import Event
 from robot_bench.events.selection import Wires, select
 from robot_bench.events.stream import EventStream
-from robot_bench.scenario.fault_script import LINK_DOWN, FaultChange, FaultTable, Span, faults_of
-from robot_bench.scenario.hand_script import ACTIONS, Action, SetPinTable, SetVoltsTable, TypeTable, actions_of
-from robot_bench.scenario.world_script import Op, ScriptedChange, ThingTable, changes_of
+from robot_bench.scenario.hands.doing import ACTION_TABLES, Doing, doing_of
 from simbase.errors import nearest, shown
 from simbase.state import Stateful
 from simbase.timing import Nanos, nanos
-
-_BUTTONS = ("stop-button", "bumper")
-
-
-class FaultActionTable(Record):
-    """A [fault](#fault-faults-injected-during-the-run-mode-b)."""
-
-    fault: Annotated[str, Key(doc="the words of a fault")]
-    for_s: Span = None
-
-    @property
-    def words(self) -> str:
-        """The fault in words."""
-        return self.fault
-
-
-class PressTable(Record):
-    """A button of a Pioneer (mode B)."""
-
-    button: Annotated[str, Key(doc='`"stop-button"`, or `"bumper front 1"`')]
-    for_s: Span = None
-
-    def __post_init__(self) -> None:
-        if self.button.split()[:1] not in [[button] for button in _BUTTONS]:
-            raise ScenarioError(f"there is no button {shown(self.button)}", hint='"stop-button", or "bumper front 1"')
-
-    @property
-    def words(self) -> str:
-        """The fault in words."""
-        return self.button
-
-
-class DropLinkTable(Record):
-    """The P2OS line is broken, both ways (mode B)."""
-
-    for_s: Span = None
-    words: ClassVar[str] = LINK_DOWN
-
-
-class SagBatteryTable(Record):
-    """A Pioneer's battery shows so much (mode B)."""
-
-    volts: Annotated[int | float, Key(kind="number", least=0, most=25.5, doc="what it shows")]
-    for_s: Span = None
-
-    @property
-    def words(self) -> str:
-        """The fault in words."""
-        return f"low-battery {self.volts}"
-
-
-class EndTable(Record):
-    """The run ends."""
-
-
-ActionTable = (
-    ThingTable | FaultActionTable | PressTable | DropLinkTable | SagBatteryTable | TypeTable | SetPinTable
-    | SetVoltsTable | EndTable
-)  # fmt: skip
-#: What is done → the table of its keys.
-ACTION_TABLES: Mapping[str, type[ActionTable]] = {
-    "place": ThingTable, "move": ThingTable, "remove": ThingTable, "inject": FaultActionTable,
-    "clear": FaultActionTable, "press": PressTable, "drop_link": DropLinkTable, "sag_battery": SagBatteryTable,
-    **ACTIONS, "end": EndTable,
-}  # fmt: skip
 
 
 class WhenTable(Record):
@@ -113,16 +46,14 @@ class WhenTable(Record):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trigger:
-    """What is done at an event; times of changes and faults are counted from it."""
+    """What is done at an event; its times are counted from that."""
 
     event: str
     do: str
     after_ns: Nanos = 0
     #: At each such event, not at the first one only.
     every: bool = False
-    changes: tuple[ScriptedChange, ...] = ()
-    faults: tuple[FaultChange, ...] = ()
-    actions: tuple[Action, ...] = ()
+    doing: Doing = field(default_factory=Doing)
     name: str = ""
     #: The name of another one whose event has to have happened; empty for none.
     after: str = ""
@@ -159,24 +90,11 @@ def load_triggers(
 
 def _load(table: Table, parameters: RobotParameters, place: Where, wires: Wires | None) -> Trigger:
     row, rest = read_part(WhenTable, table, place)
-    action = read(ACTION_TABLES[row.do], rest, place)
     with placed(place):
         select(row.event, wires)
-    changes: Sequence[ScriptedChange] = ()
-    faults: tuple[FaultChange, ...] = ()
-    actions: tuple[Action, ...] = ()
-    if isinstance(action, ThingTable):
-        changes = changes_of(action, Op(row.do), 0, parameters, f"{place}: [[obstacle]] 1")
-    elif isinstance(action, (TypeTable, SetPinTable, SetVoltsTable)):
-        actions = actions_of(action, row.do, place, wires)
-    elif row.do == "clear" and isinstance(action, FaultActionTable):
-        faults = (FaultChange(0, f"clear {action.words}"),)
-    elif not isinstance(action, EndTable):
-        fault = FaultTable(at_s=0, fault=action.words, for_s=action.for_s)
-        faults = faults_of(fault, parameters, f"{place}: [[fault]] 1")
     return Trigger(
-        event=row.event, do=row.do, after_ns=nanos(row.after_s), every=row.every, changes=tuple(changes),
-        faults=faults, actions=actions, name=row.id, after=row.after, wires=wires,
+        event=row.event, do=row.do, after_ns=nanos(row.after_s), every=row.every,
+        doing=doing_of(row.do, rest, parameters, place, wires), name=row.id, after=row.after, wires=wires,
     )  # fmt: skip
 
 
@@ -185,9 +103,7 @@ class TriggerScript(Stateful):
 
     Args:
         triggers: What is asked for.
-        on_change: Takes changes of the world, with their times.
-        on_fault: Takes faults, with their times.
-        on_action: Takes what a hand does, with its times.
+        on_doing: Takes what is done, with its times.
         on_end: Ends the run at a time.
     """
 
@@ -197,9 +113,7 @@ class TriggerScript(Stateful):
         self,
         triggers: Sequence[Trigger],
         *,
-        on_change: Callable[[Sequence[ScriptedChange]], None],
-        on_fault: Callable[[Sequence[FaultChange]], None],
-        on_action: Callable[[Sequence[Action]], None],
+        on_doing: Callable[[Doing], None],
         on_end: Callable[[Nanos], None],
     ) -> None:
         self._triggers = tuple(triggers)
@@ -214,7 +128,7 @@ class TriggerScript(Stateful):
         self._first: list[Nanos] = [-1] * len(self._triggers)
         #: Places whose event has happened in the batch that is handed on, and when.
         self._happened: list[tuple[int, Nanos]] = []
-        self._on_change, self._on_fault, self._on_action, self._on_end = on_change, on_fault, on_action, on_end
+        self._on_doing, self._on_end = on_doing, on_end
 
     def subscribe(self, stream: EventStream) -> None:
         """Have the events of a run looked at."""
@@ -241,11 +155,6 @@ class TriggerScript(Stateful):
         for place, since in happened:
             when = self._triggers[place]
             at = max(limit + 1, since + when.after_ns)
-            if when.changes:
-                self._on_change([replace(change, at=at + change.at) for change in when.changes])
-            if when.faults:
-                self._on_fault([FaultChange(at + fault.at, fault.words) for fault in when.faults])
-            if when.actions:
-                self._on_action([replace(action, at=at + action.at) for action in when.actions])
+            self._on_doing(when.doing.begun_at(at))
             if when.do == "end":
                 self._on_end(at)

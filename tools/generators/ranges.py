@@ -21,8 +21,10 @@ from p2os.robots import model_file
 from p2os.toml_record import keys_of
 from p2os.toml_schema import Key
 from robot_bench.scenario.goals.kinds import every_kind
+from robot_bench.scenario.hands.doing import ACTION_TABLES
+from robot_bench.scenario.hands.timed import TimedHandTable
 from robot_bench.scenario.tables import TABLES, TopTable
-from robot_bench.scenario.trigger_script import ACTION_TABLES, WhenTable
+from robot_bench.scenario.trigger_script import WhenTable
 from robot_bench.scenario.world_script import ThingTable
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -170,6 +172,7 @@ def tables() -> dict[str, str]:
         "scenario tables": keys_table({name: keys for name, keys in TABLES.items() if name not in {"", *_OF_SCRIPTS}}),
         **{name.strip("[]"): keys_table({"": TABLES[name]}) for name in _OF_SCRIPTS},
         "when": keys_table({"": keys_of(WhenTable)}),
+        "hand": keys_table({"": keys_of(TimedHandTable)}),
         "actions": kinds_table(
             "`do`", "what is done", {do: (one, one.__doc__ or "") for do, one in ACTION_TABLES.items()}
         ),

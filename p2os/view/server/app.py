@@ -105,9 +105,11 @@ class ViewApp:
             await socket.close(TOO_MANY, f"{MOST_PAGES} pages look already")
             return
         self._pages += 1
+        session = PageSession(self._source, may_control=role is PageRole.CONTROL)
         try:
-            await _PageConnection(socket, PageSession(self._source, may_control=role is PageRole.CONTROL)).run()
+            await _PageConnection(socket, session).run()
         finally:
+            session.close()
             self._pages -= 1
 
 

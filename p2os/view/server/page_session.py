@@ -19,7 +19,7 @@ from p2os.view.frames import FrameFlags
 from p2os.view.header import Answered, PageHeader, Wanted
 from p2os.view.live import ShownSource
 from p2os.view.recording import ViewRecording
-from p2os.view.run_control import MOST_LETTERS, CommandError, RunState, command_of
+from p2os.view.run_control import MOST_LETTERS, CommandError, RunCommand, RunState, command_of
 from simbase.timing import Nanos
 
 #: chosen: a page's request has less than a kilobyte.
@@ -61,6 +61,8 @@ class PageSession:
         self._header: PageHeader | None = None
         self._channels = 0
         self._lost = 0
+        #: Whether it drives the robot, as far as it has said.
+        self._is_driving = False
         self._room, self._asked_at = float(MOST_AT_ONCE), 0.0
 
     @property
@@ -101,6 +103,13 @@ class PageSession:
             yield _said(header=self._recording.full_header)
         elif header.end_ns != old.end_ns:
             yield _said(now_ns=header.end_ns)
+
+    def close(self) -> None:
+        """Take that the page is gone: what it drove stands."""
+        control = self._source.control
+        if self._is_driving and control is not None:
+            self._is_driving = False
+            control.offer(RunCommand(do="drive"))
 
     def receive(self, text: str, now_s: float) -> Iterator[str | bytes]:
         """Yield the answer to a request.
@@ -147,6 +156,8 @@ class PageSession:
             yield _said(refused="this link is for looking on")
         elif not control.offer(command):
             yield _said(refused="too many commands wait")
+        elif command.do == "drive":
+            self._is_driving = bool(command.forward_mps or command.turn_dps)
 
     def _offered(self, found: Mapping[str, object]) -> str:
         """Answer what a name of a variable may be that begins so."""

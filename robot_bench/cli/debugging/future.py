@@ -20,12 +20,15 @@ from bluepill_sim.program.line_table import read_lines
 from bluepill_sim.program.variables import Variable
 from robot_bench.bench import Bench, run_of
 from robot_bench.bench.waiting import TraceMark, events_since, mark_of
+from robot_bench.cli.debugging.hands import hand_of
 from robot_bench.cli.debugging.machine import BenchMachine
 from robot_bench.cli.debugging.points import STEPS, HaltPoint, other_lines
 from robot_bench.events.kinds import Event
 from robot_bench.events.selection import Selector, Wires
 from robot_bench.events.words import what_of
 from robot_bench.recording.recorder import SAMPLE_NS
+from robot_bench.scenario.hands.timed import Hand
+from simbase.errors import P2osError, UsageError
 from simbase.timing import NS_PER_MS, Nanos
 
 #: chosen: older states; 50 MB at the most, and of an hour one each ten seconds.
@@ -58,25 +61,46 @@ class _Watch:
         self.selector, self.end = selector, end
 
 
-class _WatchedMachine(BenchMachine):
-    """A bench whose snapshots have what its watches know, too."""
+class _FutureMachine(BenchMachine):
+    """A bench whose snapshots have what its watches know, too; what hands do comes again wherever it goes back to.
 
-    def __init__(self, bench: Bench, watches: Mapping[int, _Watch]) -> None:
+    Args:
+        bench: At the moment where the future begins.
+        watches: What it halts at.
+        hands: What hands do in this future, the earliest first; the bench knows of all of them.
+    """
+
+    def __init__(self, bench: Bench, watches: Mapping[int, _Watch], hands: Sequence[Hand]) -> None:
         super().__init__(bench)
-        self._watches = watches
+        self._run, self._watches = run_of(bench), watches
+        self.hands: Sequence[Hand] = tuple(hands)
+        self._known = self.hands
 
     def snapshot(self) -> object:
         """Return all that decides the bench's future, and what the watches have seen."""
-        return super().snapshot(), {number: one.selector.snapshot() for number, one in self._watches.items()}
+        seen = {number: one.selector.snapshot() for number, one in self._watches.items()}
+        return super().snapshot(), seen, self._known
 
     def restore(self, snapshot: object) -> None:
-        """Put back what `snapshot` returned; watches that are newer stay as they are."""
+        """Put back what `snapshot` returned; watches and hands that are newer stay as they are."""
         assert isinstance(snapshot, tuple)  # noqa: S101 - its own
-        bench, seen = snapshot
+        bench, seen, self._known = snapshot
         super().restore(bench)
         for number, one in self._watches.items():
             if number in seen:
                 one.selector.restore(seen[number])
+        self.take(self.hands)
+
+    def take(self, hands: Sequence[Hand]) -> None:
+        """Have hands do this from now on, and nothing else; what they have done by now is the same."""
+        known, self.hands = self._known, tuple(hands)
+        for hand in known:
+            if not any(hand is one for one in self.hands):
+                self._run.take_back(hand.doing)
+        for hand in self.hands:
+            if not any(hand is one for one in known):
+                self._run.schedule(hand.doing)
+        self._known = self.hands
 
 
 class Future:
@@ -86,10 +110,11 @@ class Future:
         name: Of it.
         bench: At the moment where it begins.
         parent: The name of the one that it leaves; empty: it is the run itself.
-        words: What was done where it begins.
+        words: What is done where it begins.
+        hands: What hands do in it, the earliest first; the bench knows of all of them.
     """
 
-    def __init__(self, name: str, bench: Bench, parent: str = "", words: str = "") -> None:
+    def __init__(self, name: str, bench: Bench, parent: str = "", words: str = "", hands: Sequence[Hand] = ()) -> None:
         self.name, self.parent, self.words = name, parent, words
         self._watches: dict[int, _Watch] = {}
         self._points: dict[int, HaltPoint] = {}
@@ -97,7 +122,7 @@ class Future:
         self._hits: list[tuple[Nanos, int, str]] = []
         #: What was seen of the watched variables since that was taken.
         self._seen: list[SeenStretch] = []
-        self._take(bench)
+        self._take(bench, hands)
         #: Until when all is known: who records it says so.
         self.known_ns: Nanos = bench.events.released_until
         self.begins_ns: Nanos = self.now_ns
@@ -108,9 +133,9 @@ class Future:
         #: Where it stood last: what happens later counts, though it be reported when the chip is further.
         self._stood_ns: Nanos = self.head_ns
 
-    def _take(self, bench: Bench) -> None:
+    def _take(self, bench: Bench, hands: Sequence[Hand]) -> None:
         self.bench = bench
-        self.machine = _WatchedMachine(bench, self._watches)
+        self.machine = _FutureMachine(bench, self._watches, hands)
         self._sampler = VariableSampler(self.machine.board, self._see)
         run_of(bench).samplers.append(self._sampler)
         self.execution = Execution(self.machine, most_points=MOST_POINTS, slice_ns=SLICE_NS)
@@ -121,7 +146,7 @@ class Future:
         self.arm({})
         run_of(self.bench).samplers.remove(self._sampler)
         history = self.execution.history
-        self._take(bench)
+        self._take(bench, self.hands)
         self.execution.history.take(history)
         self.arm(points)
         self.watch(variables)
@@ -144,6 +169,16 @@ class Future:
 
     #: When the variables were looked at last.
     _seen_until: Nanos = 0
+
+    @property
+    def hands(self) -> Sequence[Hand]:
+        """What hands do in it, the earliest first."""
+        return self.machine.hands
+
+    @property
+    def is_past(self) -> bool:
+        """Whether it is known what comes next: it stands where it has been before."""
+        return self.known_ns - self.now_ns >= SAMPLE_NS
 
     @property
     def now_ns(self) -> Nanos:
@@ -262,6 +297,33 @@ class Future:
                 if stop.kind is not StopKind.INTERRUPT:
                     break
         return self._stand("the end of the run" if stop.kind is StopKind.END else "")
+
+    def do_by_hand(self, words: str) -> None:
+        """Do what words mean at the first moment that nothing is known of yet, up to 50 ms from here, and go there.
+
+        What hands would have done later is not done any more.
+
+        Raises:
+            UsageError: They mean nothing that can be done, or the run is over.
+            P2osError: It cannot be done then; nothing has changed.
+        """
+        at = max(self.now_ns, self.known_ns) + 1
+        if at >= self.bench.end:
+            raise UsageError("the run is over", hint="go back: what is done there begins a fork")
+        hand, kept, snapshot = hand_of(words, at, self.bench), self.hands, self.machine.snapshot()
+        self.machine.take([*(one for one in kept if one.at < at), hand])
+        try:
+            self.execution.pass_to(at)
+        except P2osError:
+            self.machine.hands = kept
+            self.machine.restore(snapshot)
+            self.execution.history.forget_after(self.machine.board.cycle)
+            raise
+        self.head_ns = max(self.head_ns, self.now_ns)
+
+    def stand(self) -> None:
+        """Stand still where the chip is, and know all that happened by now."""
+        self._stand("")
 
     # To other times.
 

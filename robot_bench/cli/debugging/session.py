@@ -3,7 +3,8 @@
 Passive: time is an argument. Whoever owns it calls `do` with a command, and `go_on` with the time of a clock while
 `is_running`; it says how long nothing is to be done.
 
-Invariant: whatever is asked, the run itself leaves the trace that it would have left; only a fork is another run.
+Invariant: whatever else is asked, the run itself leaves the trace that it leaves with what hands have done in it, each
+at its time, and nobody looking; only a fork is another run.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -17,16 +18,18 @@ from p2os.view.run_control import (
     Doing,
     FutureState,
     HaltState,
+    HandState,
     PartingState,
     RunCommand,
     RunState,
 )
 from robot_bench.bench import Bench
-from robot_bench.cli.debugging.changes import change
 from robot_bench.cli.debugging.future import SLICE_NS, Future, Halted
+from robot_bench.cli.debugging.hands import drive_words, driven_by
 from robot_bench.cli.debugging.points import HaltPoint, point_of
 from robot_bench.events.words import distinguishing_words, what_of
 from robot_bench.recording.divergence import Difference, differences
+from robot_bench.scenario.hands.timed import Hand
 from simbase.errors import P2osError, UsageError
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
@@ -38,6 +41,10 @@ MOST_FUTURES = 8
 MOST_VARIABLES = 32
 #: chosen: differences that are listed, the first that part.
 MOST_SIGNALS = 8
+#: chosen: what hands did last is listed.
+MOST_HANDS = 20
+#: What is done beside a run that goes on: where it cannot be, the run goes on.
+_BESIDE = frozenset({"hand", "drive", "save"})
 #: chosen: slower than this, what happens is looked for ahead of the time that is shown: else it would come late.
 _SLOW = 0.25
 #: chosen: a bench that cannot keep the pace goes on from where it is after so long, ns of the clock.
@@ -57,6 +64,13 @@ class FutureRecorder(Protocol):
 
     def dropped(self, future: Future) -> None:
         """Forget a future."""
+
+    def saved(self, future: Future, kind: str) -> str:
+        """Write down what hands have done in a future, as a `scenario` or a `test`; return where, for a person.
+
+        Raises:
+            P2osError: It cannot be written.
+        """
 
 
 class RunSession:
@@ -82,14 +96,17 @@ class RunSession:
         self._counts: dict[int, int] = {}
         self._variables: dict[str, Variable] = {}
         self._compared: dict[str, tuple[str, Nanos, tuple[PartingState, ...]]] = {}
-        self._why, self._trouble, self._done = "", "", 0
+        self._why, self._trouble, self._done, self._saved = "", "", 0, ""
+        #: How somebody drives the robot, m/s and deg/s, as far as the run goes on; None: nobody does.
+        self._speeds: tuple[float, float] | None = None
         self._reported_at: Nanos | None = None
         self._state: RunState | None = None
         self._base: tuple[Nanos, Nanos] | None = None
         self._doing: Mapping[Doing, Callable[[RunCommand], None]] = {
             "run": self._run, "pause": self._pause, "go": self._go, "step": self._step, "back": self._back,
             "speed": self._set_speed, "fork": self._fork, "choose": self._choose, "drop": self._drop,
-            "compare": self._compare, "halt_at": self._halt_at, "halt_not_at": self._halt_not_at,
+            "compare": self._compare, "hand": self._hand, "drive": self._drive, "save": self._save,
+            "halt_at": self._halt_at, "halt_not_at": self._halt_not_at,
             "watch": self._watch, "watch_not": self._watch_not,
         }  # fmt: skip
         recorder.begin(self._main)
@@ -98,6 +115,11 @@ class RunSession:
     def bench(self) -> Bench:
         """The bench of the run itself."""
         return self._main.bench
+
+    @property
+    def hands(self) -> Sequence[Hand]:
+        """What hands do in the run itself, the earliest first."""
+        return self._main.hands
 
     @property
     def chosen(self) -> Future:
@@ -115,7 +137,10 @@ class RunSession:
             place = "" if self.is_running else self._chosen.place
             self._state = RunState(
                 is_running=self.is_running, speed=self.speed, head_ns=self._chosen.head_ns, why=self._why, place=place,
-                trouble=self._trouble, done=self._done, future=self._chosen.name,
+                trouble=self._trouble, done=self._done, future=self._chosen.name, saved=self._saved,
+                hand_count=len(self._chosen.hands), hands=[
+                    HandState(at_ns=one.at, words=one.words or one.do) for one in self._chosen.hands[-MOST_HANDS:]
+                ],
                 futures=[self._state_of(one) for one in self._futures.values()],
                 halts=[HaltState(number=number, words=one.words, count=self._counts[number])
                        for number, one in self._points.items()],
@@ -136,13 +161,14 @@ class RunSession:
 
     def do(self, command: RunCommand) -> None:
         """Do what a page asks for; what cannot be done is said in the state."""
-        self._state, self._reported_at, self._base, self._trouble = None, None, None, ""
+        self._state, self._reported_at, self._base, self._trouble, self._saved = None, None, None, "", ""
         try:
             self._doing[command.do](command)
         except (P2osError, BluePillError) as error:
             hint = getattr(error, "hint", None)
             self._trouble = f"{error} ({hint})" if hint else str(error)
-            self._stop("")
+            if command.do not in _BESIDE:
+                self._stop("")
         self._done += 1
         self._state = None
 
@@ -153,6 +179,7 @@ class RunSession:
             return
         self._chosen.resume()
         self.is_running, self._why = True, ""
+        self._drive_on()
 
     def _pause(self, _command: RunCommand) -> None:
         if self.is_running:
@@ -208,17 +235,54 @@ class RunSession:
         self._go(command)
         parent, name = self._chosen, f"fork {next(self._numbers)}"
         bench = parent.bench.fork(self._folder / f"{name.replace(' ', '-')}.jsonl")
-        if command.words.strip():
-            change(bench, command.words)
-        future = Future(name, bench, parent.name, command.words.strip())
+        words = command.words.strip()
+        future = Future(name, bench, parent.name, words, parent.hands)
         self._futures[name] = self._known[name] = future
         self._recorder.forked(future, parent)
         future.watch(list(self._variables.values()))
+        try:
+            if words:
+                future.do_by_hand(words)
+        except P2osError:
+            self._leave(future)
+            raise
         self._choose_future(future)
-        future.look_ahead()
-        self._stop("")
+
+    def _hand(self, command: RunCommand) -> None:
+        """Do something in the chosen future; where it is known what comes next, in a fork that begins there."""
+        was_running = self.is_running
+        if command.at_ns is not None:
+            self._go(command)
+        if self._chosen.is_past:
+            self._fork(command)
+        else:
+            self._chosen.do_by_hand(command.words)
+            if not was_running:
+                self._chosen.stand()
+        if was_running:
+            self._chosen.resume()
+            self.is_running, self._why = True, ""
+        if command.words.split()[:1] in (["drive"], ["let"]):
+            self._speeds = driven_by(self._chosen.hands, self._chosen.now_ns)
+
+    def _drive(self, command: RunCommand) -> None:
+        """Drive by hand from now on; a run that stands still is driven when it goes on."""
+        self._speeds = round(command.forward_mps, 3), round(command.turn_dps, 1)
+        if self.is_running:
+            self._drive_on()
+
+    def _drive_on(self) -> None:
+        """Have the chosen future driven as somebody wants."""
+        if self._speeds not in {None, driven_by(self._chosen.hands, self._chosen.now_ns)}:
+            self._hand(RunCommand(do="hand", words=drive_words(self._speeds or (0.0, 0.0))))
+
+    def _save(self, command: RunCommand) -> None:
+        if command.words not in {"scenario", "test"}:
+            raise UsageError(f"hands are not saved as {command.words!r}", hint="scenario or test")
+        self._saved = self._recorder.saved(self._chosen, command.words)
 
     def _choose(self, command: RunCommand) -> None:
+        self._speeds = None
         self._choose_future(self._named(command.future))
 
     def _choose_future(self, future: Future) -> None:
@@ -234,6 +298,9 @@ class RunSession:
             raise UsageError("the run itself stays", hint="drop a fork")
         if future is self._chosen:
             self._choose_future(self._main)
+        self._leave(future)
+
+    def _leave(self, future: Future) -> None:
         del self._futures[future.name]
         self._compared = {name: row for name, row in self._compared.items() if future.name not in {name, row[0]}}
         self._recorder.dropped(future)

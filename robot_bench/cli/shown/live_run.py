@@ -3,10 +3,14 @@
 Pages' commands wait in a queue until the bench stands between two slices. Nothing of a run that is known is handed over
 a second time: a bench that was set back comes by the same again.
 
+What hands do in the run itself is written into its folder at once, as a scenario that is that run without a page.
+
 Invariant: nobody who looks on decides anything: the trace is the same with and without.
 """
 
+import os
 import queue
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,17 +23,23 @@ from p2os.transport.wall_clock import Clock, wall_clock
 from p2os.view.header import PageHeader
 from p2os.view.live import LiveRecording
 from p2os.view.recording import ViewRecording
-from p2os.view.run_control import RunCommand, RunState
+from p2os.view.run_control import DRIVE_HOLD_NS, RunCommand, RunState
 from robot_bench.bench import Bench, run_of
 from robot_bench.cli.debugging.future import Future, SeenStretch
 from robot_bench.cli.debugging.session import MAIN, RunSession
+from robot_bench.cli.shown.offered_hands import hands_of
+from robot_bench.cli.shown.saved_hands import pytest_text, scenario_text
 from robot_bench.events.codec import Blocks, EdgeBlock, Json, Levels, Recorded
+from robot_bench.recording.run_folder import HANDS_NAME
 from robot_bench.report.run_page import lead_of
 from robot_bench.run import meta_of
+from robot_bench.scenario.hands.timed import Hand
 from robot_bench.scenario.scenario import Scenario
 from robot_bench.view.run_tracks import RunTracks
 from robot_bench.view.variable_track import VariableTrack
 from robot_bench.wires.edges import Edges
+from simbase.errors import UsageError
+from simbase.files import writing
 from simbase.timing import Nanos
 
 #: chosen: commands that may wait; a person gives some a second.
@@ -85,6 +95,11 @@ class VariablesSeen:
 Happened = BenchBuilt | BenchReleased | FutureForked | FutureDropped | VariablesSeen
 
 
+def _shown(path: Path) -> str:
+    """Return a path as one types it here."""
+    return os.path.relpath(path) if path.is_relative_to(Path.cwd()) else str(path)
+
+
 class LiveRun:
     """Hands over what happens on a bench, and does there what pages ask for.
 
@@ -105,7 +120,8 @@ class LiveRun:
         on_wait: Callable[[], None] = lambda: None,
         clock: Clock = wall_clock,
     ) -> None:
-        self._recording = ViewRecording(PageHeader(title=scenario.name))
+        self._scenario = scenario
+        self._recording = ViewRecording(PageHeader(title=scenario.name, hands=hands_of(scenario)))
         self._tracks: dict[str, RunTracks] = {}
         #: Future and name → the channel of a variable.
         self._seen: dict[tuple[str, str], VariableTrack] = {}
@@ -117,6 +133,11 @@ class LiveRun:
         self._state = RunState(is_running=True, speed=speed)
         self._session: RunSession | None = None
         self._folder: TemporaryDirectory[str] | None = None
+        #: The run's own, and what is written there.
+        self._run_folder: Path | None = None
+        self._written: Sequence[Hand] = ()
+        #: Until when who drives was heard of, ns of the clock; None: nobody drives.
+        self._drives_until: Nanos | None = None
         #: Whether it goes on to be controlled when the run is over, by `stay`.
         self.stays = False
         #: What a server shows.
@@ -150,6 +171,7 @@ class LiveRun:
         """Run a bench to its end, as `run_scenario` takes it."""
         meta = meta_of(bench.scenario, bench.parts.world, run_of(bench).note, is_at_port=False)
         self.source.offer(BenchBuilt(meta), bench.now, is_kept=True)
+        self._run_folder = None if bench.trace.path is None else bench.trace.path.parent
         self._folder = TemporaryDirectory(prefix="p2os-view-")
         session = self._session = RunSession(bench, self, Path(self._folder.name), self._speed)
         session.watch(self._variables)
@@ -179,7 +201,10 @@ class LiveRun:
 
     def _turn(self, session: RunSession) -> None:
         """Do a command, or run a slice."""
-        wait_s = session.go_on(self._clock()) if session.is_running else _WAIT_S
+        now = self._clock()
+        if self._drives_until is not None and now >= self._drives_until:
+            self._do(session, RunCommand(do="drive"))
+        wait_s = session.go_on(now) if session.is_running else _WAIT_S
         self._hand_over_variables(session)
         self._show(session.state())
         if wait_s:
@@ -188,7 +213,17 @@ class LiveRun:
             command = self._commands.get(block=wait_s > 0, timeout=wait_s or None)
         except queue.Empty:
             return
+        self._do(session, command)
+
+    def _do(self, session: RunSession, command: RunCommand) -> None:
+        """Do what was asked for."""
         session.do(command)
+        if command.do == "drive":
+            is_driving = bool(command.forward_mps or command.turn_dps)
+            self._drives_until = self._clock() + DRIVE_HOLD_NS if is_driving else None
+        if session.hands != self._written and self._run_folder is not None:
+            self._written = session.hands
+            self._write(HANDS_NAME, scenario_text(self._scenario, self._written, self._run_folder))
         self._hand_over_variables(session)
         self._show(session.state())
 
@@ -196,6 +231,23 @@ class LiveRun:
         for future, types in session.watched():
             if stretches := future.take_seen():
                 self.source.offer(VariablesSeen(future.name, stretches, types), future.known_ns)
+
+    def _place(self) -> Path:
+        """Return the run's folder.
+
+        Raises:
+            UsageError: It has none.
+        """
+        if self._run_folder is None:
+            raise UsageError("this run has no folder to write into", hint="p2os run SCENARIO --view")
+        return self._run_folder
+
+    def _write(self, name: str, text: str, *, is_beside: bool = False) -> Path:
+        place = self._place()
+        path = (place.parent if is_beside else place) / name
+        with writing(path):
+            path.write_text(text, encoding="utf-8")
+        return path
 
     def _show(self, state: RunState) -> None:
         if state is not self._state:
@@ -229,6 +281,18 @@ class LiveRun:
     def dropped(self, future: Future) -> None:
         """Forget a future."""
         self.source.offer(FutureDropped(future.name), future.known_ns, is_kept=True)
+
+    def saved(self, future: Future, kind: str) -> str:
+        """Write down what hands have done in a future beside the run's folder, as a scenario or a test; say where."""
+        place = self._place()
+        name = place.name if future.name == MAIN else f"{place.name}-{future.name.replace(' ', '-')}"
+        text = scenario_text(self._scenario, future.hands, place.parent)
+        file = self._write(f"{name}.toml", text, is_beside=True)
+        if kind == "scenario":
+            return f"saved: p2os run {_shown(file)}"
+        test = pytest_text(file.name, self._scenario.duration_ns)
+        module = re.sub(r"\W+", "_", name)
+        return f"saved: pytest {_shown(self._write(f'test_{module}.py', test, is_beside=True))}"
 
     def _add(self, happened: Happened) -> None:
         if isinstance(happened, BenchBuilt):

@@ -1,6 +1,7 @@
 """Any commands in any order, by a rule-based machine: the run itself stays what it is, and time stays in it."""
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from tempfile import mkdtemp
 
@@ -22,6 +23,11 @@ PLACES = st.sampled_from([
     "pin p2dx_con high", "packet PULSE", "note adapter connected", "robot near 0 0 1", "time 0.4", "line dodge.c:1",
     "variable nothing", "goal met",
 ])  # fmt: skip
+BY_HAND = st.sampled_from([
+    "move crate to 1.2 0.1 heading 20", "place post cylinder 0.1 at 1 1", "remove crate", "carry robot to 0.3 0.2",
+    "fault sonar-stuck 3 0.2", "clear sonar-stuck 3", "press stop-button", "pin DD3 high", "let go DD3",
+    "volts PA0 1.5", "type usart1 go", "drive 0.2 30", "let go wheels", "nonsense",
+])  # fmt: skip
 DONE = st.sampled_from(["", "fault link-down", "fault sonar-stuck 3 0.2", "pin DD3 high", "nonsense"])
 
 
@@ -37,15 +43,42 @@ class ControlMachine(RuleBasedStateMachine):
         self.done = 0
 
     def teardown(self) -> None:
-        """End as whoever ends the run does: it is the run that nobody controls."""
+        """End as whoever ends the run does: it is the run that nobody controls, with what hands did in it."""
         session = self.run.session
         known = session.state().futures[0].end_ns
         session.end()
         assert session.bench.now >= min(known, session.bench.end)
         session.bench.run_until(session.bench.end)
         session.bench.finish()
-        assert session.bench.trace.sha256 == type(self).alone
+        assert session.bench.trace.sha256 == (self.with_hands() if session.hands else type(self).alone)
         shutil.rmtree(self.folder)
+
+    def with_hands(self) -> str:
+        """Return the hash of the run whose scenario has what hands did."""
+        bench = Bench(replace(scenario(DURATION_S), hands=tuple(self.run.session.hands)))
+        bench.run_until(bench.end)
+        bench.finish()
+        return bench.trace.sha256
+
+    @rule(words=BY_HAND)
+    def hand(self, words: str) -> None:
+        """It is done where the run stands, in a fork where it is known what comes next, or not at all."""
+        before = self.run.session.state()
+        is_past = self.run.session.chosen.is_past
+        state = self.do("hand", words=words)
+        if state.trouble:
+            assert (state.hands, len(state.futures)) == (before.hands, len(before.futures))
+        else:
+            assert state.hands[-1].words == words
+            assert before.head_ns < state.hands[-1].at_ns <= state.head_ns
+            assert len(state.futures) == len(before.futures) + is_past
+
+    @rule(forward_mps=st.sampled_from([0.0, 0.2, -0.3]), turn_dps=st.sampled_from([0.0, 30.0]))
+    def drive(self, forward_mps: float, turn_dps: float) -> None:
+        """A run that stands still stays where it is: it is driven when it goes on."""
+        before = self.run.session.state()
+        state = self.do("drive", forward_mps=forward_mps, turn_dps=turn_dps)
+        assert before.is_running or state.head_ns == before.head_ns
 
     def do(self, do: str, **about: object) -> RunState:
         self.done += 1
@@ -112,7 +145,7 @@ class ControlMachine(RuleBasedStateMachine):
         assert len(state.futures) == before + (not state.trouble)
         if not state.trouble:
             assert state.futures[-1].name == state.future
-            assert state.futures[-1].at_ns == state.head_ns
+            assert 0 <= state.head_ns - state.futures[-1].at_ns <= (NS_PER_MS if words else 0)
 
     @rule(place=st.integers(0, 3))
     def choose(self, place: int) -> None:

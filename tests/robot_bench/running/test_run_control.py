@@ -40,6 +40,9 @@ class Listener:
     def dropped(self, future: Future) -> None:
         self.names.remove(future.name)
 
+    def saved(self, future: Future, kind: str) -> str:
+        return f"{future.name} as a {kind}"
+
 
 class Controlled:
     """A session with a clock of its own."""
@@ -244,7 +247,7 @@ def test_forks_are_dropped_and_the_run_itself_is_not(run: Controlled) -> None:
     [
         ("fault nothing", "nothing"), ("pin PZ9 low", "no wire"), ("pin PB12 up", "no level"),
         ("dance", "nothing is done"),
-        ("volts PA0 much", "not understood"), ("type usart9 x", "no port"), ("remove nobody", "nobody"),
+        ("volts PA0 much", "not understood"), ("type usart9 x", "none of usart1"), ("remove nobody", "nobody"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_done_makes_no_fork(words: str, trouble: str, run: Controlled) -> None:

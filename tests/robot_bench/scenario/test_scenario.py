@@ -13,9 +13,9 @@ from p2os.pioneer.world import load_world
 from p2os.toml_record import keys_of
 from robot_bench.bench import Bench
 from robot_bench.scenario.goals.kinds import every_kind
+from robot_bench.scenario.hands.doing import ACTION_TABLES
 from robot_bench.scenario.loading import known_scenarios, load_scenario, read_scenario
 from robot_bench.scenario.tables import TABLES
-from robot_bench.scenario.trigger_script import ACTION_TABLES
 from robot_bench.scenario.world_script import Op
 from simbase.errors import P2osError, UsageError
 

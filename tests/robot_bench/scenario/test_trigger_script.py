@@ -41,7 +41,7 @@ def test_a_thing_is_placed_and_held_after_an_edge(after_s: float, at: int) -> No
 @pytest.mark.parametrize("do", ["place", "move", "remove"])
 def test_what_is_done_to_a_thing_is_what_is_asked_for(do: str) -> None:
     (when,) = load_triggers([{"event": "contact", "do": do, **POST, "x_m": 1, "y_m": 2}], P2DX, "x.toml")
-    (change,) = when.changes
+    (change,) = when.doing.changes
     place = (0.0, 0.0) if do == "remove" else (1.0, 2.0)
     assert (change.op.value, change.name, change.x_m, change.y_m) == (do, "post", *place)
     assert (change.obstacle is not None) is (do == "place")

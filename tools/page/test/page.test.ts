@@ -15,8 +15,8 @@ import { channel, frame, header, runs, samples, store } from "./made";
 describe("a layout", () => {
   it.each(LAYOUTS.map((layout) => [layout.id, layout] as const))("%s has each view once and shares that are one", (_, layout) => {
     const views = layout.columns.flatMap((column) => column.groups.flatMap((group) => group.views));
-    expect(new Set(views)).toEqual(new Set(["plan", "logic", "plots", "packets", "consoles", "events", "goals", "states", "scene", "report"]));
-    expect(views).toHaveLength(10);
+    expect(new Set(views)).toEqual(new Set(["hands", "plan", "logic", "plots", "packets", "consoles", "events", "goals", "states", "scene", "report"]));
+    expect(views).toHaveLength(11);
     for (const parts of [layout.columns, ...layout.columns.map((column) => column.groups)]) expect(parts.reduce((sum, part) => sum + part.share, 0)).toBeCloseTo(1);
   });
 

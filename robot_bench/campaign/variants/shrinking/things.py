@@ -21,7 +21,7 @@ from robot_bench.campaign.trial import Trial
 #: The name of the world's file in a trial whose world shipped.
 WORLD_NAME = "world.toml"
 #: Lists of a scenario whose tables can be left out. Goals are not: they say what a failure is.
-OF_SCENARIO = ("obstacle", "when", "fault", "part", "robot")
+OF_SCENARIO = ("obstacle", "when", "fault", "hand", "part", "robot")
 #: Lists of a world's file; marks touch nothing and go with the rest.
 OF_WORLD = ("wall", "box", "cylinder", "floor", "ramp", "mesh", "mark", "import")
 #: Tables of a scenario whose numbers are made round, beside those of its lists.

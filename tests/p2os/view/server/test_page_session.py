@@ -233,6 +233,31 @@ def test_who_may_only_look_on_controls_nothing() -> None:
     assert asked(controlled(Run(0)), do="pause")[1] == [{"refused": "too many commands wait"}]
 
 
+def test_what_a_page_drives_stands_when_it_is_gone() -> None:
+    run = Run()
+    session = controlled(run)
+    session.close()
+    assert run.taken == [], "it has not driven"
+    asked(session, do="drive", forward_mps=-2, turn_dps=360)
+    session.close()
+    session.close()
+    assert run.taken[1:] == [RunCommand(do="drive")]
+    asked(session, do="drive", forward_mps=0.1)
+    asked(session, do="drive", forward_mps=0)
+    session.close()
+    assert len(run.taken) == 4, "it stands already"
+    watching = controlled(run, may_control=False)
+    asked(watching, do="drive", forward_mps=0.1)
+    watching.close()
+    assert len(run.taken) == 4
+    full = Run(1)
+    refused = controlled(full)
+    asked(refused, do="pause")
+    asked(refused, do="drive", forward_mps=0.1)
+    refused.close()
+    assert full.taken == [RunCommand(do="pause")]
+
+
 @pytest.mark.parametrize(
     "sent",
     [
@@ -244,6 +269,9 @@ def test_who_may_only_look_on_controls_nothing() -> None:
         {"do": "speed", "speed": -1}, {"do": "speed", "speed": True}, {"do": "halt_at", "words": "x" * 401},
         {"do": "halt_at", "words": "a\nb"}, {"do": "halt_at", "words": 1}, {"do": "run", "want": [0]},
         {"do": "halt_not_at", "number": "1"}, {"do": "choose", "future": None},
+        {"do": "drive", "forward_mps": 2.1}, {"do": "drive", "turn_dps": -361}, {"do": "drive", "turn_dps": "1"},
+        {"do": "drive", "at_ns": 1}, {"do": "drive", "forward_mps": True}, {"do": "drive", "forward_mps": float("nan")},
+        {"do": "drive", "forward_mps": float("inf")}, {"do": "hand", "words": "a\nb"}, {"do": "hand", "speed": 1},
     ],
 )  # fmt: skip
 def test_what_is_no_command_ends_the_page(sent: dict[str, Any]) -> None:
@@ -264,7 +292,7 @@ def test_speeds_at_their_bounds_are_taken() -> None:
 _ANY = st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text() | st.lists(st.integers())
 
 
-@given(st.dictionaries(st.sampled_from(["do", "at_ns", "unit", "speed", "words", "future", "number", "x"]), _ANY))
+@given(st.dictionaries(st.sampled_from(["do", "at_ns", "unit", "speed", "words", "number", "turn_dps", "x"]), _ANY))
 def test_anything_at_all_is_a_command_or_refused(sent: dict[str, Any]) -> None:
     run = Run()
     with contextlib.suppress(RequestError):

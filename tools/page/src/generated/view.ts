@@ -225,6 +225,26 @@ export interface ChannelHeader {
   readonly transitions: readonly StateTransition[];
 }
 
+/** A fault that can be injected: `fault NAME WORD …`. */
+export interface FaultOffer {
+  readonly name: string;
+  readonly doc: string;
+  readonly words: readonly WordOffer[];
+  readonly is_momentary: boolean;
+}
+
+/** What hands can do in what is shown, beside moving its things. */
+export interface HandsOffer {
+  readonly faults: readonly FaultOffer[];
+  readonly buttons: readonly string[];
+  readonly pins: readonly string[];
+  readonly analog_pins: readonly string[];
+  readonly ports: readonly string[];
+  readonly most_mps: number;
+  readonly most_dps: number;
+  readonly is_real: boolean;
+}
+
 /** A cell of a table. */
 export interface PageCell {
   readonly text: string;
@@ -258,6 +278,7 @@ export interface PageHeader {
   readonly channels: readonly ChannelHeader[];
   readonly world: WorldHeader | null;
   readonly robots: readonly RobotHeader[];
+  readonly hands: HandsOffer | null;
   readonly sections: readonly PageSection[];
   readonly left_out: readonly string[];
   readonly footer: string;
@@ -361,6 +382,16 @@ export interface Wanted {
   readonly id: number;
 }
 
+/** A word behind the name of a fault: one of `choices`, or a number. */
+export interface WordOffer {
+  readonly name: string;
+  readonly choices: readonly string[];
+  readonly least: number;
+  readonly most: number;
+  readonly step: number;
+  readonly usual: string;
+}
+
 /** The world. */
 export interface WorldHeader {
   readonly name: string;
@@ -407,6 +438,12 @@ export interface HaltState {
   readonly count: number;
 }
 
+/** What a hand did, and when. */
+export interface HandState {
+  readonly at_ns: number;
+  readonly words: string;
+}
+
 /** Where a signal of two futures differs first. */
 export interface PartingState {
   readonly signal: string;
@@ -417,13 +454,15 @@ export interface PartingState {
 
 /** What a page asks of a run. */
 export interface RunCommand {
-  readonly do: "run" | "pause" | "go" | "step" | "back" | "speed" | "fork" | "choose" | "drop" | "compare" | "halt_at" | "halt_not_at" | "watch" | "watch_not";
+  readonly do: "run" | "pause" | "go" | "step" | "back" | "speed" | "fork" | "choose" | "drop" | "compare" | "halt_at" | "halt_not_at" | "watch" | "watch_not" | "hand" | "drive" | "save";
   readonly at_ns: number | null;
   readonly unit: "instruction" | "line" | "edge" | "packet" | "event" | "millisecond";
   readonly speed: number;
   readonly words: string;
   readonly future: string;
   readonly number: number;
+  readonly forward_mps: number;
+  readonly turn_dps: number;
 }
 
 /** How a run stands. */
@@ -439,9 +478,12 @@ export interface RunState {
   readonly futures: readonly FutureState[];
   readonly halts: readonly HaltState[];
   readonly variables: readonly string[];
+  readonly hand_count: number;
+  readonly hands: readonly HandState[];
+  readonly saved: string;
 }
 
 export type Standing = "" | "passed" | "failed" | "open";
 export type PageBlock = PageTable | PageText | PagePicture | PagePlot | PageList | PagePlan;
-export type Doing = "run" | "pause" | "go" | "step" | "back" | "speed" | "fork" | "choose" | "drop" | "compare" | "halt_at" | "halt_not_at" | "watch" | "watch_not";
+export type Doing = "run" | "pause" | "go" | "step" | "back" | "speed" | "fork" | "choose" | "drop" | "compare" | "halt_at" | "halt_not_at" | "watch" | "watch_not" | "hand" | "drive" | "save";
 export type StepUnit = "instruction" | "line" | "edge" | "packet" | "event" | "millisecond";

@@ -23,21 +23,21 @@ export const LAYOUTS: readonly Layout[] = [
     id: "student", title: "Student",
     columns: [
       { share: 0.58, groups: [{ share: 0.62, views: ["plan", "scene"] }, { share: 0.38, views: ["plots", "logic"] }] },
-      { share: 0.42, groups: [{ share: 0.6, views: ["report", "goals", "states"] }, { share: 0.4, views: ["events", "consoles", "packets"] }] },
+      { share: 0.42, groups: [{ share: 0.6, views: ["report", "hands", "goals", "states"] }, { share: 0.4, views: ["events", "consoles", "packets"] }] },
     ],
   },
   {
     id: "firmware", title: "Firmware engineer",
     columns: [
       { share: 0.64, groups: [{ share: 0.62, views: ["logic"] }, { share: 0.38, views: ["plots", "packets"] }] },
-      { share: 0.36, groups: [{ share: 0.4, views: ["plan", "scene"] }, { share: 0.3, views: ["consoles", "events"] }, { share: 0.3, views: ["states", "goals", "report"] }] },
+      { share: 0.36, groups: [{ share: 0.4, views: ["plan", "scene"] }, { share: 0.3, views: ["consoles", "events"] }, { share: 0.3, views: ["states", "goals", "hands", "report"] }] },
     ],
   },
   {
     id: "lab", title: "Robot lab",
     columns: [
       { share: 0.6, groups: [{ share: 0.6, views: ["scene"] }, { share: 0.4, views: ["packets", "consoles"] }] },
-      { share: 0.4, groups: [{ share: 0.4, views: ["plan"] }, { share: 0.3, views: ["plots", "logic"] }, { share: 0.3, views: ["events", "states", "goals", "report"] }] },
+      { share: 0.4, groups: [{ share: 0.4, views: ["plan"] }, { share: 0.3, views: ["plots", "logic"] }, { share: 0.3, views: ["hands", "events", "states", "goals", "report"] }] },
     ],
   },
 ];

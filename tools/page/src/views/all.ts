@@ -1,5 +1,6 @@
 // Every view of the page, in the order of keys and tabs.
 import type { ViewKind } from "../shell/app";
+import { hands } from "../hands/view";
 import { consoles } from "./lists/consoles";
 import { events } from "./lists/events";
 import { goals } from "./lists/goals";
@@ -11,4 +12,4 @@ import { report } from "./report/view";
 import { scene } from "./scene/view";
 import { states } from "./states";
 
-export const VIEWS: readonly ViewKind[] = [plan, report, logic, plots, packets, consoles, events, goals, states, scene];
+export const VIEWS: readonly ViewKind[] = [plan, report, logic, plots, packets, consoles, events, goals, states, scene, hands];

@@ -11,6 +11,7 @@ import { type Sheet, surface } from "../../shell/surface";
 import { moment } from "../../time/format";
 import { Camera } from "./camera";
 import * as drawing from "./drawing";
+import { HandModes, PlanHands } from "./hands";
 import { colouredPath, type ColouredPath, placeAt } from "./poses";
 import { covers, thingsAt } from "./things";
 import { boundsOf, nearest, tracksAt } from "./tracks";
@@ -27,6 +28,7 @@ export const plan: ViewKind = {
 class PlanView {
   readonly dispose: () => void;
   private readonly camera = new Camera();
+  readonly hands: PlanHands;
   private readonly follow = signal(false);
   private readonly by = signal<"time" | "speed">("time");
   private readonly paths = new Map<number, { frame: Frame; by: string; path: ColouredPath }>();
@@ -36,6 +38,7 @@ class PlanView {
 
   constructor(private readonly app: App, host: HTMLElement) {
     const bar = document.createElement("div"), caption = document.createElement("div");
+    this.hands = new PlanHands(app, this.camera);
     bar.className = "view-bar";
     caption.className = "view-caption";
     host.append(bar);
@@ -89,6 +92,7 @@ class PlanView {
       drawing.robot(sheet, camera, track, n, tracks.length > 1);
     });
     drawing.names(sheet, camera, present);
+    this.hands.draw(sheet);
     const marks = store.channels("events").flatMap((channel) => {
       const frame = store.whole(channel.id);
       return frame ? drawing.contacts(sheet, camera, frame, now) : [];
@@ -129,15 +133,15 @@ class PlanView {
     let drag: { x: number; y: number } | undefined;
     canvas.addEventListener("wheel", (event) => {
       event.preventDefault();
-      this.camera.zoom(event.deltaY > 0 ? 0.85 : 1 / 0.85, event.offsetX, event.offsetY);
+      if (!this.hands.wheel(event.deltaY > 0 ? -1 : 1)) this.camera.zoom(event.deltaY > 0 ? 0.85 : 1 / 0.85, event.offsetX, event.offsetY);
       this.redraw();
     }, { passive: false });
     canvas.addEventListener("pointerdown", (event) => {
-      drag = { x: event.clientX, y: event.clientY };
+      if (!this.hands.press(event.offsetX, event.offsetY)) drag = { x: event.clientX, y: event.clientY };
       canvas.setPointerCapture(event.pointerId);
     });
     canvas.addEventListener("pointermove", (event) => {
-      if (drag) {
+      if (!this.hands.move(event.offsetX, event.offsetY) && drag) {
         this.follow.value = false;
         this.camera.move(event.clientX - drag.x, event.clientY - drag.y);
         drag = { x: event.clientX, y: event.clientY };
@@ -145,7 +149,15 @@ class PlanView {
       this.pointer = { x: event.offsetX, y: event.offsetY };
       this.redraw();
     });
-    canvas.addEventListener("pointerup", () => { drag = undefined; });
+    canvas.addEventListener("pointerup", () => {
+      drag = undefined;
+      this.hands.release();
+      this.redraw();
+    });
+    canvas.addEventListener("pointercancel", () => {
+      drag = undefined;
+      this.hands.cancel();
+    });
     canvas.addEventListener("pointerleave", () => {
       this.pointer = undefined;
       this.redraw();
@@ -170,6 +182,7 @@ function Bar({ view }: { view: PlanView }) {
       <label class="inline-label">path by <select aria-label="Colour the path by" value={view.colouring.value} onChange={(event) => { view.colouring.value = event.currentTarget.value as "time" | "speed"; }}>
         <option value="time">time</option><option value="speed">speed</option>
       </select></label>
+      <HandModes hands={view.hands} />
     </>
   );
 }

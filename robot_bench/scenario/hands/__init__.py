@@ -1,0 +1,1 @@
+"""What is done to a run by hand: its tables, its times, its words."""

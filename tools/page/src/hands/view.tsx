@@ -1,0 +1,26 @@
+// The hands: what a person does to a run that goes on.
+import "../style/hands.css";
+import { render } from "preact";
+import type { App, ViewKind } from "../shell/app";
+import { Drive } from "./drive";
+import { Driving } from "./driving";
+import { Board, Done, Faults, Things } from "./parts";
+
+export const hands: ViewKind = {
+  id: "hands", title: "Hands", doc: "Drive the robot, move and make things, press, type, turn voltages, put faults: each with its time, to be run again.",
+  has: (store) => store.header.value.hands !== null && store.mayControl.value,
+  mount: (app, host) => {
+    render(<Hands app={app} driving={new Driving(app)} />, host);
+    return () => render(null, host);
+  },
+};
+
+function Hands({ app, driving }: { app: App; driving: Driving }) {
+  const offer = app.store.header.value.hands!;
+  return (
+    <div class="hands" tabIndex={0} role="region" aria-label="What hands can do">
+      {offer.most_mps > 0 && <Drive app={app} driving={driving} />}
+      {!offer.is_real && <><Things app={app} /><Faults app={app} /><Board app={app} /><Done app={app} /></>}
+    </div>
+  );
+}
