@@ -101,33 +101,19 @@ static bool leaves_result(enum micro number)
     return is_load || !(is_flags || is_long || is_other);
 }
 
-#define BY_N_ROW(name) {OP_##name, OP_##name##_BY_N},
-#define BY_M_ROW(name) {OP_##name, OP_##name##_BY_M},
-static const struct chained {
-    uint16_t number, code;
-} by_n[] = {CHAINED_BY_N(BY_N_ROW)}, by_m[] = {CHAINED_BY_M(BY_M_ROW)};
-
-static uint16_t chained(const struct chained *rows, size_t count, uint16_t number)
-{
-    for (size_t n = 0; n < count; ++n) {
-        if (rows[n].number == number) {
-            return rows[n].code;
-        }
-    }
-    return number;
-}
+#define BY_N_CODE(name) [OP_##name] = OP_##name##_BY_N,
+#define BY_M_CODE(name) [OP_##name] = OP_##name##_BY_M,
+/* By the number of a micro-operation: its code where it reads what was done last; 0: there is none. */
+static const uint16_t by_n[MICRO_COUNT] = {CHAINED_BY_N(BY_N_CODE)}, by_m[MICRO_COUNT] = {CHAINED_BY_M(BY_M_CODE)};
 
 /* The code of a micro-operation behind another one, whose result it may read. */
 static uint16_t code_behind(const struct op *before, const struct op *op)
 {
-    uint16_t code = op->number;
-    if (before != NULL && leaves_result(before->number)) {
-        code = before->d == op->n ? chained(by_n, sizeof by_n / sizeof by_n[0], code) : code;
-        if (code == op->number && before->d == op->m) {
-            code = chained(by_m, sizeof by_m / sizeof by_m[0], code);
-        }
+    const bool has_result = before != NULL && leaves_result(before->number);
+    if (has_result && before->d == op->n && by_n[op->number]) {
+        return by_n[op->number];
     }
-    return code;
+    return has_result && before->d == op->m && by_m[op->number] ? by_m[op->number] : op->number;
 }
 
 enum { ANYTHING = UINT16_MAX };

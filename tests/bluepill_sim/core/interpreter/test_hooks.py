@@ -36,21 +36,21 @@ both = pytest.mark.parametrize("kind", [UnicornCore, InterpreterCore])
 
 @both
 @pytest.mark.parametrize("access", [LOAD, STORE])
-def test_an_access_is_told_to_the_hooks_in_whose_range_it_begins(kind: type[UnicornCore], access: str) -> None:
+def test_an_access_is_reported_to_the_hooks_in_whose_range_it_begins(kind: type[UnicornCore], access: str) -> None:
     core, _ = core_of(kind, access + BKPT)
     heard: list[tuple[str, int, int, int, int]] = []
     core.on_access(SRAM + 0x10, SRAM + 0x13, lambda *seen: heard.append(("a", *seen)) or True)
     core.on_access(SRAM + 0x13, SRAM + 0x13, lambda *seen: heard.append(("b", *seen)) or True)
-    told, value = (16, 0) if access == LOAD else (17, 0xA5)
+    reported, value = (16, 0) if access == LOAD else (17, 0xA5)
     for offset, names in ((0x0F, ""), (0x10, "a"), (0x12, "a"), (0x13, "ab"), (0x14, "")):
         heard.clear()
         core.registers[Reg.R0], core.registers[Reg.R1] = 0x9FA5, SRAM + offset
         core.start(FLASH | 1)
-        assert heard == [(name, told, SRAM + offset, 1, value) for name in names], offset
+        assert heard == [(name, reported, SRAM + offset, 1, value) for name in names], offset
 
 
 @both
-def test_a_failed_access_is_told_to_the_hooks_in_whose_range_it_is(kind: type[UnicornCore]) -> None:
+def test_a_failed_access_is_reported_to_the_hooks_in_whose_range_it_is(kind: type[UnicornCore]) -> None:
     core, _ = core_of(kind, LOAD + BKPT)
     nothing = 0x3000_0000
     heard: list[str] = []
@@ -98,7 +98,7 @@ def test_an_access_that_a_hook_lets_pass_is_made_where_something_is_by_then(kind
 
 
 @both
-def test_an_instruction_is_told_to_the_hooks_in_whose_range_it_begins(kind: type[UnicornCore]) -> None:
+def test_an_instruction_is_reported_to_the_hooks_in_whose_range_it_begins(kind: type[UnicornCore]) -> None:
     """ADDS R0, #1 five times, of which the second has 32 bits; and a stop is before the instruction."""
     core, _ = core_of(kind, "0130 10f10100 0130 0130 0130" + BKPT)
     heard: list[tuple[str, int, int]] = []
@@ -113,8 +113,10 @@ def test_an_instruction_is_told_to_the_hooks_in_whose_range_it_begins(kind: type
     core.registers[Reg.R0] = 0
     core.start(FLASH | 1)
     expected = [("c",), ("a", "c"), ("a", "b", "c"), ("c",), ("c",)]
-    told = [(name, place, n) for n, (place, names) in enumerate(zip(places, expected, strict=True)) for name in names]
-    assert heard[:-1] == told
+    reported = [
+        (name, place, n) for n, (place, names) in enumerate(zip(places, expected, strict=True)) for name in names
+    ]
+    assert heard[:-1] == reported
     assert heard[-1] == ("c", FLASH + 12, 5), "the BKPT"
     core.drop_all_code()
     core.hook_instructions(core.instruction_callback(lambda _address: core.stop()), places[3], places[3])
@@ -124,7 +126,7 @@ def test_an_instruction_is_told_to_the_hooks_in_whose_range_it_begins(kind: type
     assert (core.registers[Reg.R0], core.registers[Reg.PC]) == (3, places[3])
 
 
-def test_the_size_of_an_instruction_is_told() -> None:
+def test_the_size_of_an_instruction_is_reported() -> None:
     core, _ = core_of(InterpreterCore, "0130 10f10100" + BKPT)
     sizes: list[tuple[int, int]] = []
     callback = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_uint64, ctypes.c_uint32, ctypes.c_void_p)(
@@ -214,13 +216,15 @@ TRAPS = {
 
 @pytest.mark.parametrize("code", TRAPS)
 @pytest.mark.parametrize("stops", [True, False])
-def test_a_trap_is_told_before_its_instruction_which_is_done_where_nobody_stops_it(code: str, *, stops: bool) -> None:
+def test_a_trap_is_reported_before_its_instruction_which_is_done_where_nobody_stops_it(
+    code: str, *, stops: bool
+) -> None:
     core, data = core_of(InterpreterCore, "013f" + code + "013e" + BKPT)  # SUBS R7, #1; SUBS R6, #1
     before = data.raw
-    told: list[tuple[bool, int, int]] = []
+    reported: list[tuple[bool, int, int]] = []
 
     def trapped(_user: int, is_alignment: bool, pc: int, value: int) -> None:
-        told.append((is_alignment, pc, value))
+        reported.append((is_alignment, pc, value))
         if stops:
             core.stop()
 
@@ -231,7 +235,7 @@ def test_a_trap_is_told_before_its_instruction_which_is_done_where_nobody_stops_
         core.registers[name] = value
     core.start(FLASH | 1)
     is_alignment, value = TRAPS[code]
-    assert told == [(is_alignment, FLASH + 2, value)]
+    assert reported == [(is_alignment, FLASH + 2, value)]
     left = {name: core.registers[name] for name in names}
     if stops:
         assert left == names | {Reg.R7: 6}
@@ -247,13 +251,13 @@ def test_a_trap_is_told_before_its_instruction_which_is_done_where_nobody_stops_
 
 
 @pytest.mark.parametrize("code", TRAPS)
-def test_no_trap_is_told_where_there_is_none(code: str) -> None:
+def test_no_trap_is_reported_where_there_is_none(code: str) -> None:
     core, _ = core_of(InterpreterCore, code + BKPT)
-    told: list[int] = []
+    reported: list[int] = []
     callback = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_bool, ctypes.c_uint32, ctypes.c_uint32)(
-        lambda *_: told.append(1)
+        lambda *_: reported.append(1)
     )
     library().interpreter_set_trap(core.handle, ctypes.cast(callback, ctypes.c_void_p), None)
     core.registers[Reg.R1], core.registers[Reg.R2], core.registers[Reg.R5] = 0, 1, SRAM + 4
     core.start(FLASH | 1)
-    assert told == []
+    assert reported == []
