@@ -41,6 +41,8 @@ _MEMORY = "PMA_"
 
 #: What a part on an SPI wants to be sent.
 _EXPECTED = 0xFF
+#: The frequencies in a trace.
+_CLOCKS = ("hclk_hz", "pclk1_hz", "pclk2_hz", "timer1_hz", "timer2_hz", "usb_hz", "adc_divider", "rtcclk_hz")
 #: What no device knows.
 _NO_COMMAND = OWN_COMMANDS + 99
 #: Words of a part that has no memory of packets.
@@ -464,7 +466,8 @@ class RegisterWalker:
         yield "memory", zlib.crc32(board.read_memory(BUFFER, BUFFER_BYTES) or b"")
         yield "warnings", " / ".join(board.warnings)
         yield "resets", " ".join(f"{cause.name} {count}" for cause, count in board.resets.items())
-        yield "hclk", board.hclk_hz
+        clocks = board.chip.clocks
+        yield "clocks", " ".join(str(getattr(clocks, name)) for name in _CLOCKS)
 
     def _found(self, name: str) -> tuple[Any, Register]:
         base, _, register = name.partition(".")
