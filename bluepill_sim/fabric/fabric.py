@@ -163,7 +163,7 @@ class Fabric(Stateful):
         self._failure: BaseException | None = None
         self._names: dict[int, str] = {}
         self._acts: dict[int, Callable[[Nanos], None]] = {}
-        self._answers: dict[int, Callable[[int, int], int]] = {}
+        self._answers: dict[int, Callable[[int, int], int | None]] = {}
         self._deliveries: dict[int, Callable[[], None]] = {}
         self._kept: list[object] = []
         #: Called with (number of the pin, 0 for a fight with the outside and 1 for a short).
@@ -294,7 +294,7 @@ class Fabric(Stateful):
         state: int,
         *,
         act: Callable[[Nanos], None],
-        answer: Callable[[int, int], int],
+        answer: Callable[[int, int], int | None],
         deliver: Callable[[], None],
     ) -> int:
         """Take a slot for a device in C; return its number.
@@ -636,7 +636,7 @@ class Fabric(Stateful):
         raise MemoryError("no memory for what the chip shows")
 
     def _ask(self, slot: int, what: int, value: int) -> int:
-        return self._answers[slot](what, value)
+        return self._answers[slot](what, value) or 0
 
     def _guarded(self, call: Callable[..., _Result], default: _Result) -> Callable[..., _Result]:
         """Return a callback for C: what it raises is kept, and the slice ends."""

@@ -456,15 +456,15 @@ class Peripheral(Stateful):
         """Have the device in C do something; return its answer."""
         return self.fabric.command(self.slot, what, one, other)
 
-    def answer(self, what: int, value: int) -> int:
-        """Answer what the device in C asks."""
+    def answer(self, what: int, value: int) -> int | None:
+        """Answer what the device in C asks; None where it only notifies."""
         if what >= OWN_ANSWERS:
             raise NotImplementedError(f"{self.name} was asked {what}, {value}")
         if what == HEARS_LINE:
             self.line_changed(self.INPUTS[value >> 1], bool(value & 1))
         else:
             self.pins_changed()
-        return 0
+        return None
 
     def listen_to_pins(self, port: str, pins: int) -> None:
         """Have a LISTENER's `pins_changed` called for inputs of these pins of a port, a bit each, from now on."""

@@ -39,7 +39,7 @@ class InterruptLatency(Stateful):
         self._struct: Any = structure(LATENCY)()
         self._slot = fabric.add_device(
             "latency of interrupts", "latency", 0, ctypes.addressof(self._struct),
-            act=lambda _ns: None, answer=lambda _what, _value: 0, deliver=lambda: None,
+            act=lambda _ns: None, answer=lambda _what, _value: None, deliver=lambda: None,
         )  # fmt: skip
         self._is_varied = False
 

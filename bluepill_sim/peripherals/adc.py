@@ -132,7 +132,7 @@ class Adc(Peripheral):
         """Return that of PCLK2."""
         return "pclk2_hz"
 
-    def answer(self, what: int, value: int) -> int:
+    def answer(self, what: int, value: int) -> None:
         """Warn."""
         question, divider = AdcQuestion(what), self.native.divider
         has_pin = question is AdcQuestion.NOT_ANALOG
@@ -142,7 +142,6 @@ class Adc(Peripheral):
             mhz=self.native.hz / divider / 1e6,
         )  # fmt: skip
         self.chip.warn(f"{self.name}: {text}", once=f"{self.name}:{question.name}:{value}")
-        return 0
 
     def _route_changed(self) -> None:
         remaps = self.chip.pins.remaps

@@ -101,7 +101,7 @@ class Afio(Peripheral):
         super().__init__(chip, place)
         self.command(RESET)
 
-    def answer(self, what: int, value: int) -> int:
+    def answer(self, what: int, value: int) -> None:
         """Tell of pins and routes, or warn."""
         if what == AfioQuestion.PLACED:
             self._name_holders(is_written=bool(value))
@@ -109,7 +109,6 @@ class Afio(Peripheral):
             self._publish()
         else:
             self.chip.warn(f"AFIO_MAPR: SWJ_CFG = {value:03b} has no meaning: ignored", once="AFIO:swj")
-        return 0
 
     def _write_evcr(self, written: int, _previous: int) -> None:
         if written & 1 << 7:

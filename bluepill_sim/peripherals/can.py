@@ -913,9 +913,8 @@ class Can(Peripheral):
             self.due_ns = start_ns + (bits.decided_ns if phase == _TO_DECIDE else 0)
         fabric.command(self._bits_slot, _GO_ON)
 
-    def _tries_changed(self, _what: int, _value: int) -> int:
+    def _tries_changed(self, _what: int, _value: int) -> None:
         self._settle()  # it has lost its pin
-        return 0
 
     def _show_level(self, tx: int, rx: int) -> None:
         self._connect()

@@ -80,8 +80,7 @@ class Dma(Peripheral):
         """Return that of HCLK."""
         return "hclk_hz"
 
-    def answer(self, what: int, value: int) -> int:
+    def answer(self, what: int, value: int) -> None:
         """Warn."""
         question = DmaQuestion(what)
         self.chip.warn(f"{self.name} channel {value + 1}: {_WARNINGS[question]}", once=f"{self.name}:{value}:{what}")
-        return 0

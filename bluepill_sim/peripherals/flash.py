@@ -281,20 +281,19 @@ class Flash(Peripheral):
         else:
             self._option_key_step = 1
 
-    def answer(self, what: int, value: int) -> int:
+    def answer(self, what: int, value: int) -> None:
         """Take what the device in C hears: a write after which something is to be done."""
         if what == FlashQuestion.ACCESS:
             self.chip.clock_changed()
-            return 0
+            return
         if what == FlashQuestion.RESERVED:
             self.chip.warn(f"FLASH_ACR: LATENCY = {value} is reserved", once="FLASH:latency")
-            return 0
+            return
         index, previous = value >> 16, value & _HALFWORD
         if index == CR:
             self._write_cr(self.words[CR], previous)
         else:
             self._update_irq()
-        return 0
 
     def _write_cr(self, written: int, previous: int) -> None:
         if previous & LOCK or self.is_busy:

@@ -106,11 +106,10 @@ class Gpio(Peripheral):
         """Undo the lock."""
         self._lock_writes = ()
 
-    def answer(self, what: int, value: int) -> int:
+    def answer(self, what: int, value: int) -> None:
         """Warn of a locked pin that was configured."""
         del what  # it asks nothing else
         self.chip.warn(f"P{self.name[-1]}{value}: configured while locked: ignored", once=f"{self.name}:lock")
-        return 0
 
     def _released(self, pin: Pin) -> None:
         """Check again an input that is no longer driven."""

@@ -276,7 +276,7 @@ class I2c(Peripheral):
             for sink in list(self._sinks):
                 sink(rows)
 
-    def answer(self, what: int, value: int) -> int:
+    def answer(self, what: int, value: int) -> int | None:
         """Tell the parts what is on the bus, or the master outside what became of its step; or warn."""
         now_ns = self.chip.now_ns
         if what == I2cQuestion.ADDRESS:
@@ -305,7 +305,7 @@ class I2c(Peripheral):
                 f"{self.name}_DR: an address written before SR1 was read with SB or ADD10: ignored",
                 once=f"{self.name}:sb",
             )
-        return 0
+        return None
 
     def _address(self, byte: int, now_ns: int) -> bool:
         """Take an address; return whether somebody acknowledges it."""

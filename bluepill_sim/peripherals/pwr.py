@@ -110,7 +110,7 @@ class Pwr(Peripheral):
     def _restored(self) -> None:
         self._listen()
 
-    def answer(self, what: int, value: int) -> int:
+    def answer(self, what: int, value: int) -> None:
         """Unlock or lock the backup domain, look at the supply, or hear a line or a pin."""
         if what == PwrQuestion.BACKUP:
             self.chip.power.is_backup_open = bool(value)
@@ -119,8 +119,7 @@ class Pwr(Peripheral):
         elif what == PwrQuestion.WAKE_PIN:
             self._place_pin()
         else:
-            return super().answer(what, value)
-        return 0
+            super().answer(what, value)
 
     def _place_pin(self) -> None:
         """Give PA0 to WKUP, with its pull-down, while EWUP is set (RM0008 5.4.2)."""

@@ -333,7 +333,7 @@ class Rcc(Peripheral):
         self._warn_of_settings(now_ns)
         self._schedule()
 
-    def answer(self, what: int, value: int) -> int:
+    def answer(self, what: int, value: int) -> None:
         """Do what follows from the clocks, reset a peripheral, tell of the gates, or warn."""
         if what == RccQuestion.RESETS:
             self.chip.reset_peripheral(self.fabric.name_of(value))
@@ -350,7 +350,6 @@ class Rcc(Peripheral):
         else:
             message, key = _WARNINGS[RccQuestion(what)]
             self.chip.warn(message, once=key)
-        return 0
 
     def fail_crystal(self) -> None:
         """Break the crystal of HSE; `repair_crystal` mends it."""

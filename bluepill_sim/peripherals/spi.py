@@ -236,7 +236,7 @@ class Spi(Peripheral):
             for sink in list(self._sinks):
                 sink(rows)
 
-    def answer(self, what: int, value: int) -> int:
+    def answer(self, what: int, value: int) -> int | None:
         """Exchange a word with the parts, follow their select pins, or warn."""
         if what == SpiQuestion.EXCHANGE:
             return self._exchange(value)
@@ -251,7 +251,7 @@ class Spi(Peripheral):
             names = dict(zip(("MISO", "MOSI", "NSS", "SCK"), self._pin_names, strict=True))
             question = SpiQuestion(what)
             self.chip.warn(f"{self.name}{_WARNINGS[question].format(**names)}", once=f"{self.name}:{question.name}")
-        return 0
+        return None
 
     def _exchange(self, word: int) -> int:
         self._settle()

@@ -280,7 +280,7 @@ class Usart(Peripheral):
             for sink in self.sinks if rows else ():
                 sink(rows)
 
-    def answer(self, what: int, value: int) -> int:
+    def answer(self, what: int, value: int) -> int | None:
         """Warn, or give the next characters."""
         if what == UsartQuestion.EXCHANGE:
             return self._exchange(value)
@@ -292,7 +292,7 @@ class Usart(Peripheral):
             self._check_modes()
         else:
             self._warn(UsartQuestion(what))
-        return 0
+        return None
 
     def _exchange(self, word: int) -> int:
         """Return what comes in, in synchronous mode, while a word goes out."""

@@ -205,7 +205,7 @@ class Usb(Peripheral):
         """Whether D+ is pulled up."""
         return self.chip.pins["PA12"].level
 
-    def bus_changed(self, state: BusState, at_ns: Nanos, frame: int = 0) -> None:
+    def bus_changed(self, state: BusState, at_ns: Nanos, frame: int) -> None:
         """Take a state of the bus; FRAMES begin with the number `frame`."""
         now_frame = self._frame_at(at_ns)
         if self._bus is BusState.FRAMES:
@@ -338,7 +338,7 @@ class Usb(Peripheral):
 
     # Registers.
 
-    def answer(self, what: int, value: int) -> int:
+    def answer(self, what: int, value: int) -> None:
         """Take what the device in C hears: a line, a pin, or a write that has changed a word."""
         if what == UsbQuestion.WRITTEN:
             if value >> 16 == CNTR:
@@ -353,7 +353,6 @@ class Usb(Peripheral):
             self.line_changed(self.INPUTS[value >> 1], bool(value & 1))
         else:
             self.pins_changed()
-        return 0
 
     def _control(self, previous: int) -> None:
         """Follow a new word of CNTR."""

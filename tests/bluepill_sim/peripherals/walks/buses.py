@@ -133,7 +133,13 @@ def _spi(number: int) -> RegisterWalk:  # noqa: C901 - a function a move
         w.write(f"{name}.CR1", settings | _SPE)
 
     def send(w: RegisterWalker) -> None:
-        w.write(f"{name}.DR", w.number(0x10000))
+        w.write(f"{name}.DR", w.pick((0xFF, w.number(0x10000))))
+
+    def send_many(w: RegisterWalker) -> None:
+        for _ in range(4):
+            w.write(f"{name}.DR", w.pick((0xFF, 0xFF, 0xFF, 0)))
+            w.run(w.pick((9_000, 20_000)))
+            w.read(f"{name}.DR")
 
     def take(w: RegisterWalker) -> None:
         if w.number(2):
@@ -169,7 +175,7 @@ def _spi(number: int) -> RegisterWalk:  # noqa: C901 - a function a move
 
     return RegisterWalk(
         name=name, parts=(name, "DMA1") if number == 1 else (name,), begin=begin,
-        moves=(send, send, send, take, take, clock_in, wires, control, checked),
+        moves=(send, send, send_many, take, take, clock_in, wires, control, checked),
         spans_ns=(125, 250, 1_000, 2_000, 4_500, 9_000, 33_000), episodes=26 if number == 1 else 10,
     )  # fmt: skip
 

@@ -53,7 +53,7 @@ def _flash_begin(w: RegisterWalker) -> None:
 def _flash_move(w: RegisterWalker) -> None:
     register, words = w.pick((
         ("CR", (0, 1, 0x81, 2, 0x42, 4, 0x10, 0x210, 0x260, 0x220, 0x1401, 0x1600, 0x80)),
-        ("AR", (0x0800_0400, 0x0800_0C00)),
+        ("AR", (0x0800_0400, 0x0800_0C00, 0x0800_1400)),
         ("SR", (0x34, 4, 0x20)), ("ACR", (0x10, 0x12, 0x38)), ("CR", (0x42, 0x1442, 0x210, 1)),
         ("KEYR", (0x4567_0123, 0xCDEF_89AB)), ("OPTKEYR", (0x4567_0123, 0xCDEF_89AB)),
     ))  # fmt: skip
@@ -62,7 +62,7 @@ def _flash_move(w: RegisterWalker) -> None:
 
 def _flash_program(w: RegisterWalker) -> None:
     flash = w.part("FLASH")
-    offset, size, word = 0x800 + 2 * w.number(4), w.pick((2, 2, 2, 2, 1, 4)), w.number(0x10000)
+    offset, size, word = w.pick((0x800, 0x1800)) + 2 * w.number(4), w.pick((2, 2, 2, 2, 1, 4)), w.number(0x10000)
     call = w.pick((flash.program, flash.program, flash.program_option))
     if call == flash.program_option:
         offset, word = 2 * w.number(8), w.pick((word, 0xA5))
@@ -71,8 +71,27 @@ def _flash_program(w: RegisterWalker) -> None:
     w.note(f"{call.__name__} {offset:#x} {size} {word:#x}: {call(offset, size, word)}")
 
 
+def _flash_protect(w: RegisterWalker) -> None:
+    """Erase the option bytes, or write a group's, and have a reset load them."""
+    flash = w.part("FLASH")
+    w.write("FLASH.CR", 0x260)
+    w.run(20_000_000)
+    if w.number(2):
+        w.write("FLASH.CR", 0x210)
+        for offset, word in ((0, 0xA5), (8, w.pick((0xFE, 0xFC, 0xFD)))):
+            w.note(f"{flash.program_option(offset, 2, word)}")
+            w.run(52_500)
+    w.reset()
+    w.write("FLASH.KEYR", 0x4567_0123)
+    w.write("FLASH.KEYR", 0xCDEF_89AB)
+    w.write("FLASH.CR", 2)
+    w.write("FLASH.AR", w.pick((0x0800_0400, 0x0800_1400)))
+    w.write("FLASH.CR", 0x42)
+
+
 _FLASH = RegisterWalk(
-    name="FLASH", parts=("FLASH",), begin=_flash_begin, moves=(_flash_move, _flash_move, _flash_program),
+    name="FLASH", parts=("FLASH",), begin=_flash_begin,
+    moves=(*(_flash_move, _flash_program) * 3, _flash_move, _flash_protect),
     spans_ns=(125, 20_000, 52_500, 70_000, 20_000_000, 40_000_000), at_random=12,
 )  # fmt: skip
 

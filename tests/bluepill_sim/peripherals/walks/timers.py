@@ -57,6 +57,13 @@ def _tim(number: int) -> RegisterWalk:  # noqa: C901 - a function a move
             w.drive(w.pick(_TIM_PINS[number]), w.pick((False, True, False, True, None)))
             w.run(w.pick((125, 1_000, 3_000)))
 
+    def glitch(w: RegisterWalker) -> None:
+        """Levels that are shorter than a filter."""
+        name_of_pin, first = w.pick(_TIM_PINS[number]), w.number(2)
+        for n in range(w.pick((3, 4, 5))):
+            w.drive(name_of_pin, bool((n + first) % 2))
+            w.run(w.pick((250, 500, 625, 1_125, 2_000)))
+
     def compare(w: RegisterWalker) -> None:
         w.write(f"{name}.CCR{1 + w.number(4)}", w.number(40))
 
@@ -76,7 +83,7 @@ def _tim(number: int) -> RegisterWalk:  # noqa: C901 - a function a move
         w.write(f"{name}.{register}", w.pick(words))
 
     return RegisterWalk(
-        name=name, parts=(name, "DMA1"), begin=begin, moves=(pin, pin, compare, clear, clear, generate, shape),
+        name=name, parts=(name, "DMA1"), begin=begin, moves=(pin, pin, glitch, compare, clear, clear, generate, shape),
         spans_ns=(125, 250, 1_000, 1_125, 4_000, 10_000, 31_000), beside=(other,), episodes=30 if number < 3 else 8,
     )  # fmt: skip
 
@@ -107,6 +114,8 @@ def _adc_begin(w: RegisterWalker) -> None:
         select = w.pick((7, 7, 7, 0, 3, 6)) << 17 | w.pick((7, 7, 0, 1, 6)) << 12
         control = 1 | select | _EXTTRIG | _JEXTTRIG | w.some(2, 2048) | (w.some(256, _TSVREFE) if name == "ADC1" else 0)
         w.write(f"{name}.CR2", control)
+    for register in ("IMR", "EMR", "RTSR"):
+        w.write(f"EXTI.{register}", 1 << 11 | 1 << 15)
     w.write("DMA1.CPAR1", BASES["ADC1"] + 0x4C)
     w.write("DMA1.CMAR1", BUFFER)
     w.write("DMA1.CNDTR1", 8)
@@ -124,6 +133,11 @@ def _adc_begin(w: RegisterWalker) -> None:
 def _adc_start(w: RegisterWalker) -> None:
     name = w.pick(("ADC1", "ADC1", "ADC2"))
     w.turn(f"{name}.CR2", on=w.pick((_SWSTART, _SWSTART, _JSWSTART, 1, _SWSTART | _JSWSTART)))
+
+
+def _adc_trigger(w: RegisterWalker) -> None:
+    w.write("EXTI.PR", 1 << 11 | 1 << 15)
+    w.write("EXTI.SWIER", w.pick((1 << 11, 1 << 15)))
 
 
 def _adc_calibrate(w: RegisterWalker) -> None:
@@ -146,7 +160,7 @@ def _adc_pin(w: RegisterWalker) -> None:
 
 _ADC = RegisterWalk(
     name="ADC", parts=("ADC1", "ADC2", "DMA1"), begin=_adc_begin,
-    moves=(_adc_start, _adc_start, _adc_start, _adc_take, _adc_take, _adc_calibrate, _adc_pin),
+    moves=(_adc_start, _adc_start, _adc_start, _adc_trigger, _adc_take, _adc_take, _adc_calibrate, _adc_pin),
     spans_ns=(125, 1_000, 3_500, 7_000, 14_000, 30_000, 100_000), beside=("TIM1",), at_random=18, episodes=34,
 )  # fmt: skip
 

@@ -39,6 +39,10 @@ _NARROW = 8
 #: Registers that are packets' memory: one of them is as good as all.
 _MEMORY = "PMA_"
 
+#: What a part on an SPI wants to be sent.
+_EXPECTED = 0xFF
+#: The frequencies in a trace.
+_CLOCKS = ("hclk_hz", "pclk1_hz", "pclk2_hz", "timer1_hz", "timer2_hz", "usb_hz", "adc_divider", "rtcclk_hz")
 #: What no device knows.
 _NO_COMMAND = OWN_COMMANDS + 99
 #: Words of a part that has no memory of packets.
@@ -76,27 +80,37 @@ class RegisterWalk:
 
 
 class CountingSpiDevice(Stateful):
-    """A part on an SPI that answers with the sum of what it was sent."""
+    """A part on an SPI that counts, and says ahead what it sends next: for any byte, or for 0xFF alone."""
 
-    STATE = ("sum",)
-    spi_modes = frozenset(range(4))
+    STATE = ("sum", "is_exact")
+    spi_modes = frozenset({0, 3})
     max_hz = 36_000_000
 
     def __init__(self) -> None:
-        self.sum = 0
+        self.sum, self.is_exact = 0, False
 
     def select(self, at_ns: int) -> None:
         """Begin from the time."""
-        self.sum = at_ns & 0xFF
+        self.sum, self.is_exact = at_ns & 0xFF, bool(at_ns // 125 & 1)
 
     def deselect(self, at_ns: int) -> None:
         """Begin from the time."""
         self.sum = at_ns >> 8 & 0xFF
 
     def exchange(self, byte: int, at_ns: int) -> int:
-        """Add."""
-        self.sum = self.sum + 3 * byte + at_ns & 0xFF
+        """Count, by more where it is sent what it does not expect."""
+        is_other = self.is_exact and byte != _EXPECTED
+        self.sum = self.sum + (3 * byte + at_ns if is_other else 1) & 0xFF
         return self.sum
+
+    def ahead(self, count: int) -> tuple[bytes, int | None]:
+        """Return what comes next."""
+        data = bytes(self.sum + n & 0xFF for n in range(1, 1 + min(count, self.sum % 7)))
+        return data, _EXPECTED if self.is_exact else None
+
+    def went(self, count: int) -> None:
+        """Count."""
+        self.sum = self.sum + count & 0xFF
 
 
 class CountingI2cDevice(Stateful):
@@ -365,7 +379,15 @@ class RegisterWalker:
     def _begin(self) -> None:
         """Free the debugger's pins, and set up a mode."""
         self.write("AFIO.MAPR", 2 << 24)
+        if not self.number(6):
+            self._share_pins()
         self.walk.begin(self)
+
+    def _share_pins(self) -> None:
+        """Have timers offer their outputs to pins that others have too."""
+        self.write("TIM1.BDTR", 0x8000)
+        for name in ("TIM1", "TIM2", "TIM3", "TIM4"):
+            self.write(f"{name}.CCER", self.pick((0x1111, 0x5555, 0x0010)))
 
     def _sweep(self) -> None:
         """Write ones and zeros into every register, and look."""
@@ -424,7 +446,7 @@ class RegisterWalker:
         """Go through all that can be seen now."""
         board = self.board
         for name in (*self.walk.parts, *self.walk.beside):
-            part = board.chip.parts.by_name[name]
+            part: Any = board.chip.parts.by_name[name]
             words = part.words
             for key, place, is_asked in _looked_at(type(part), name):
                 yield key, part.look(4 * place) if is_asked else words[place]
@@ -444,7 +466,8 @@ class RegisterWalker:
         yield "memory", zlib.crc32(board.read_memory(BUFFER, BUFFER_BYTES) or b"")
         yield "warnings", " / ".join(board.warnings)
         yield "resets", " ".join(f"{cause.name} {count}" for cause, count in board.resets.items())
-        yield "hclk", board.hclk_hz
+        clocks = board.chip.clocks
+        yield "clocks", " ".join(str(getattr(clocks, name)) for name in _CLOCKS)
 
     def _found(self, name: str) -> tuple[Any, Register]:
         base, _, register = name.partition(".")

@@ -124,9 +124,9 @@ class DoubleBuffers(RuleBasedStateMachine):
             self.chip.write("USB.CNTR", FRES)
             self.chip.write("USB.CNTR", 0)
         else:
-            self.usb.bus_changed(BusState.RESET, self.chip.now_ns)
+            self.usb.bus_changed(BusState.RESET, self.chip.now_ns, 0)
             self.chip.advance(self.chip.now_ns + RESET_NS)
-            self.usb.bus_changed(BusState.IDLE, self.chip.now_ns)
+            self.usb.bus_changed(BusState.IDLE, self.chip.now_ns, 0)
         assert self.chip.read("USB.EP1R") == self.done * self.is_done, "what is not acknowledged outlives it"
         self.chip.write("USB.ISTR", 0)
         self.chip.write("USB.DADDR", 0x85)

@@ -268,7 +268,7 @@ def test_a_bus_reset_clears_address_and_endpoints_but_not_what_waits(fake_chip: 
     endpoint(fake_chip, 1, BULK, stat=rx(VALID))
     send(usb, Token.OUT, 1, 0, b"x")
     start_ns = fake_chip.now_ns
-    usb.bus_changed(BusState.RESET, start_ns)
+    usb.bus_changed(BusState.RESET, start_ns, 0)
     fake_chip.advance(start_ns + 2_499)
     assert not fake_chip.read("USB.ISTR") & RESET
     fake_chip.advance(start_ns + 2_500)
@@ -300,7 +300,7 @@ def test_frames_raise_sof_each_millisecond_and_count(fake_chip: Any) -> None:
 
 def test_frames_that_nobody_looks_at_have_no_events(fake_chip: Any) -> None:
     usb = set_up(fake_chip)
-    usb.bus_changed(BusState.FRAMES, fake_chip.now_ns)
+    usb.bus_changed(BusState.FRAMES, fake_chip.now_ns, 0)
     fake_chip.advance(fake_chip.now_ns + MS)
     assert fake_chip.read("USB.ISTR") & SOF
     assert usb.due_ns is None
@@ -309,10 +309,10 @@ def test_frames_that_nobody_looks_at_have_no_events(fake_chip: Any) -> None:
 def test_without_frames_esof_comes_each_millisecond_and_susp_after_three(fake_chip: Any) -> None:
     usb = set_up(fake_chip, SUSP)
     start_ns = fake_chip.now_ns
-    usb.bus_changed(BusState.FRAMES, start_ns)
+    usb.bus_changed(BusState.FRAMES, start_ns, 0)
     fake_chip.advance(start_ns + 10 * MS + 300)
     fake_chip.write("USB.ISTR", 0)
-    usb.bus_changed(BusState.IDLE, fake_chip.now_ns)
+    usb.bus_changed(BusState.IDLE, fake_chip.now_ns, 0)
     quiet_ns = start_ns + 10 * MS
     for n in (1, 2, 3):
         fake_chip.advance(quiet_ns + n * MS - 1)
@@ -331,11 +331,11 @@ def test_a_resume_wakes_a_suspended_device_and_exti_18(fake_chip: Any) -> None:
     usb = set_up(fake_chip, WKUP)
     fake_chip.write("EXTI.IMR", 1 << 18)
     fake_chip.write("EXTI.RTSR", 1 << 18)
-    usb.bus_changed(BusState.RESUME, fake_chip.now_ns)
+    usb.bus_changed(BusState.RESUME, fake_chip.now_ns, 0)
     assert not fake_chip.read("USB.ISTR") & WKUP, "it was not suspended"
-    usb.bus_changed(BusState.IDLE, fake_chip.now_ns)
+    usb.bus_changed(BusState.IDLE, fake_chip.now_ns, 0)
     fake_chip.write("USB.CNTR", WKUP | FSUSP | LP_MODE)
-    usb.bus_changed(BusState.RESUME, fake_chip.now_ns)
+    usb.bus_changed(BusState.RESUME, fake_chip.now_ns, 0)
     assert fake_chip.read("USB.ISTR") & WKUP
     assert fake_chip.read("USB.FNR") & 3 << 14 == 1 << 14
     assert (fake_chip.irqs[LP], fake_chip.irqs[42]) == (True, True)
@@ -350,15 +350,15 @@ def test_a_stopped_clock_counts_no_frames_and_what_wakes_does(
     usb = set_up(fake_chip, WKUP)
     fake_chip.write("EXTI.IMR", 1 << 18)
     fake_chip.write("EXTI.RTSR", 1 << 18)
-    usb.bus_changed(BusState.FRAMES, fake_chip.now_ns)
+    usb.bus_changed(BusState.FRAMES, fake_chip.now_ns, 0)
     fake_chip.write("USB.CNTR", WKUP | SUSP | ESOF | (FSUSP if is_suspended else 0))
     fake_chip.write("USB.ISTR", 0)
     usb.clock_stopped()
     fake_chip.advance(fake_chip.now_ns + 5 * MS)
-    usb.bus_changed(BusState.IDLE, fake_chip.now_ns)
+    usb.bus_changed(BusState.IDLE, fake_chip.now_ns, 0)
     fake_chip.advance(fake_chip.now_ns + 5 * MS)
     assert fake_chip.read("USB.ISTR") == 0, "neither SOF nor ESOF nor SUSP"
-    usb.bus_changed(state, fake_chip.now_ns)
+    usb.bus_changed(state, fake_chip.now_ns, 0)
     fake_chip.advance(fake_chip.now_ns + MS)
     assert fake_chip.read("USB.ISTR") == (WKUP if is_suspended else 0)
     assert fake_chip.irqs[42] is is_suspended
@@ -369,7 +369,7 @@ def test_a_stopped_clock_counts_no_frames_and_what_wakes_does(
         assert not fake_chip.read("USB.ISTR") & RESET
         fake_chip.advance(resumed_ns + RESET_NS)
         assert fake_chip.read("USB.ISTR") & RESET
-    usb.bus_changed(BusState.FRAMES, fake_chip.now_ns)
+    usb.bus_changed(BusState.FRAMES, fake_chip.now_ns, 0)
     fake_chip.advance(fake_chip.now_ns + MS)
     assert fake_chip.read("USB.ISTR") & SOF
 

@@ -116,7 +116,7 @@ def _(chip: Bench) -> None:
 def _(chip: Bench) -> None:
     usb = set_up(chip)
     bus.endpoint(chip, 1, bus.BULK, stat=bus.rx(bus.VALID))
-    usb.bus_changed(BusState.RESET, chip.now_ns)
+    usb.bus_changed(BusState.RESET, chip.now_ns, 0)
     chip.run(bus.RESET_NS)
     assert (chip["USB.DADDR"], chip["USB.EP1R"], flags(chip) & bus.RESET) == (0, 0, bus.RESET)
 
@@ -188,9 +188,9 @@ def _(chip: Bench) -> None:
 )
 def _(chip: Bench) -> None:
     usb = set_up(chip)
-    usb.bus_changed(BusState.FRAMES, chip.now_ns)
+    usb.bus_changed(BusState.FRAMES, chip.now_ns, 0)
     chip.run(bus.MS)
-    usb.bus_changed(BusState.IDLE, chip.now_ns)
+    usb.bus_changed(BusState.IDLE, chip.now_ns, 0)
     chip.run(bus.MS)
     assert flags(chip) & (bus.SOF | bus.ESOF) == bus.SOF | bus.ESOF
     chip["USB.ISTR"] = 0xFFFF & ~bus.SOF
@@ -326,9 +326,9 @@ def _(chip: Bench) -> None:
 )
 def _(chip: Bench) -> None:
     usb = set_up(chip)
-    usb.bus_changed(BusState.FRAMES, chip.now_ns)
+    usb.bus_changed(BusState.FRAMES, chip.now_ns, 0)
     chip.run(bus.MS)
-    usb.bus_changed(BusState.IDLE, chip.now_ns)
+    usb.bus_changed(BusState.IDLE, chip.now_ns, 0)
     chip.run(3 * bus.MS)
     assert flags(chip) & bus.SUSP
     chip["USB.ISTR"] = 0
@@ -349,11 +349,11 @@ def _(chip: Bench) -> None:
 )
 def _(chip: Bench) -> None:
     usb = set_up(chip)
-    usb.bus_changed(BusState.RESUME, chip.now_ns)
+    usb.bus_changed(BusState.RESUME, chip.now_ns, 0)
     assert not flags(chip) & bus.WKUP
-    usb.bus_changed(BusState.IDLE, chip.now_ns)
+    usb.bus_changed(BusState.IDLE, chip.now_ns, 0)
     chip["USB.CNTR"] = bus.FSUSP | bus.LP_MODE
-    usb.bus_changed(BusState.RESUME, chip.now_ns)
+    usb.bus_changed(BusState.RESUME, chip.now_ns, 0)
     assert flags(chip) & bus.WKUP
     assert chip["USB.CNTR"] == bus.FSUSP
 
@@ -367,9 +367,9 @@ def _(chip: Bench) -> None:
 )
 def _(chip: Bench) -> None:
     usb = set_up(chip)
-    usb.bus_changed(BusState.FRAMES, chip.now_ns)
+    usb.bus_changed(BusState.FRAMES, chip.now_ns, 0)
     chip.run(bus.MS)
-    usb.bus_changed(BusState.IDLE, chip.now_ns)
+    usb.bus_changed(BusState.IDLE, chip.now_ns, 0)
     for _ in range(2):
         chip["USB.ISTR"] = 0
         chip.run(bus.MS - 1)
