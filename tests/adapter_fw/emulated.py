@@ -2,16 +2,16 @@
 
 Neither the image nor the emulator is part of this project: `P2OS_ESP32_EMULATOR` names the program, `P2OS_ESP32_ROM`
 the folder with its copy of the chip's ROM, `P2OS_ESP32_IMAGE` the whole flash (boot loader, table of partitions,
-application). The emulator is QEMU with the machine `esp32` of Espressif's branch. It has to know one thing more: told a
-socket in `ESP32_LOCKSTEP`, it connects, and stands still whenever virtual time has come to where it was told to go.
-Each line is one message; times are nanoseconds since power-on in decimal, the rest is hexadecimal but for ports.
+application). The emulator is QEMU with the machine `esp32` of Espressif's branch. It has to know one thing more: given
+a socket in `ESP32_LOCKSTEP`, it connects, and stands still whenever virtual time has come to where it was to go. Each
+line is one message; times are nanoseconds since power-on in decimal, the rest is hexadecimal but for ports.
 
     it says                 t PORT TIME BYTE    the stop bit of a byte has ended at a UART's TX
                             i TIME              the program has read the second register of pins
                             o TIME OUT ENABLE   what is driven has changed
                             lost PORT           a byte found a full receiver
                             at TIME             it stands; everything up to here has been said
-    it is told              l LEVELS            what stands on the pads
+    it takes                l LEVELS            what stands on the pads
                             r PORT TIME BYTE    the stop bit of a byte will end at a UART's RX
                             go TIME             run on
 
@@ -154,9 +154,9 @@ class EmulatedEsp32:
         self._go(self._zero_ns + self.now_us * NS_PER_US + _PASS_NS)
 
     def _go(self, until_ns: int) -> None:
-        told = "".join(f"{line}\n" for line in (*self._to_tell, f"go {until_ns}"))
+        commands = "".join(f"{line}\n" for line in (*self._to_tell, f"go {until_ns}"))
         self._to_tell.clear()
-        self._socket.sendall(told.encode())
+        self._socket.sendall(commands.encode())
         self._wait()
 
     def _wait(self) -> None:

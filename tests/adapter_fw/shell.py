@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from adapter_sim.pinout import Pinout, WireDirection, WireRole, load_pinout
+from p2os.pioneer.controller import Pioneer
 from p2os.protocol.commands import Command
 from p2os.protocol.frames import Frame
 from robot_bench.wires.board_test.esp32 import CONSOLE, ROBOT, Esp32
@@ -32,7 +33,9 @@ class Shell:
         robot: None: nothing is at the line.
     """
 
-    def __init__(self, program: Path | EmulatedEsp32, revision: str = "rev-b", robot: FakeRobot | None = None) -> None:
+    def __init__(
+        self, program: Path | EmulatedEsp32, revision: str = "rev-b", robot: FakeRobot | Pioneer | None = None
+    ) -> None:
         self.revision = revision
         self.esp32 = Esp32(program) if isinstance(program, Path) else program
         self.robot = robot

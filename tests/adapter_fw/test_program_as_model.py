@@ -43,11 +43,11 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 class Both:
-    """Program and model with the same wires."""
+    """Program and model with the same wires; the program's adapter begins in a millisecond of its time."""
 
-    def __init__(self, program: Path | EmulatedEsp32) -> None:
+    def __init__(self, program: Path | EmulatedEsp32, begins_ms: int = JUMPER_MS) -> None:
         self.shell = Shell(program, robot=LateRobot())
-        self.rig = Rig(AdapterSettings(), LateRobot(), now=JUMPER_MS * MS, receiver=Receiver())
+        self.rig = Rig(AdapterSettings(), LateRobot(), now=begins_ms * MS, receiver=Receiver())
 
     def run_ms(self, span_ms: int) -> None:
         self.shell.run_ms(span_ms)
