@@ -7,7 +7,7 @@ looked for in it: the components that CMakeLists.txt requires and the options th
 read is skipped aloud.
 
 Where LLVM 22 is installed it is compiled and assembled for the ESP32's processor, else only read. This is no build:
-ESP-IDF's compiler and C library are not reachable from here, nothing is linked and nothing has been flashed.
+nothing is linked. docs/adapter-firmware.md, Builds, says what has been built with ESP-IDF itself.
 """
 
 import argparse

@@ -3,9 +3,11 @@
 from pathlib import Path
 
 from adapter_sim.pinout import Pinout, WireDirection, WireRole, load_pinout
+from p2os.pioneer.controller import Pioneer
 from p2os.protocol.commands import Command
 from p2os.protocol.frames import Frame
 from robot_bench.wires.board_test.esp32 import CONSOLE, ROBOT, Esp32
+from tests.adapter_fw.emulated import EmulatedEsp32
 from tests.adapter_sim.conftest import FakeRobot
 
 PINOUT = load_pinout()
@@ -26,14 +28,16 @@ class Shell:
     """An adapter on a bench.
 
     Args:
-        library: Its program.
+        program: As a library for this machine; or an ESP32 that runs it.
         revision: Its board.
         robot: None: nothing is at the line.
     """
 
-    def __init__(self, library: Path, revision: str = "rev-b", robot: FakeRobot | None = None) -> None:
+    def __init__(
+        self, program: Path | EmulatedEsp32, revision: str = "rev-b", robot: FakeRobot | Pioneer | None = None
+    ) -> None:
         self.revision = revision
-        self.esp32 = Esp32(library)
+        self.esp32 = Esp32(program) if isinstance(program, Path) else program
         self.robot = robot
         self.text = ""
         #: Of each frame that has left at the line: when its last byte was out in µs, and the command's name.

@@ -15,6 +15,7 @@ from adapter_sim.receiver import Receiver
 from p2os.protocol.commands import Command
 from p2os.protocol.frames import Frame
 from tests.adapter_fw.builds import built
+from tests.adapter_fw.emulated import EmulatedEsp32
 from tests.adapter_fw.shell import Shell
 from tests.adapter_sim.conftest import CHARACTER_NS, MS, FakeRobot, Rig
 
@@ -42,11 +43,11 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 class Both:
-    """Program and model with the same wires."""
+    """Program and model with the same wires; the program's adapter begins in a millisecond of its time."""
 
-    def __init__(self, library: Path) -> None:
-        self.shell = Shell(library, robot=LateRobot())
-        self.rig = Rig(AdapterSettings(), LateRobot(), now=JUMPER_MS * MS, receiver=Receiver())
+    def __init__(self, program: Path | EmulatedEsp32, begins_ms: int = JUMPER_MS) -> None:
+        self.shell = Shell(program, robot=LateRobot())
+        self.rig = Rig(AdapterSettings(), LateRobot(), now=begins_ms * MS, receiver=Receiver())
 
     def run_ms(self, span_ms: int) -> None:
         self.shell.run_ms(span_ms)
@@ -80,7 +81,8 @@ class Both:
                 self.drive(rng.randrange(-4, 4), rng.randrange(-4, 4))
                 self.run_ms(rng.randrange(1, 400))
 
-    def compare(self) -> int:
+    def compare(self, apart_us: int = APART_US) -> int:
+        """Return how many frames both have sent alike, none further apart than that."""
         free_at, model = 0, []
         for at, frame in self.rig.to_robot.log:
             free_at = max(free_at, at) + len(frame) * CHARACTER_NS
@@ -89,7 +91,7 @@ class Both:
         count = min(len(program), len(model))
         assert [name for _, name in program[:count]] == [name for _, name in model[:count]]
         apart = [abs(one - other) for (one, _), (other, _) in zip(program[:count], model[:count], strict=True)]
-        assert max(apart) <= APART_US
+        assert max(apart) <= apart_us
         assert abs(len(program) - len(model)) <= 4, "only what is still on the line"
         return count
 
