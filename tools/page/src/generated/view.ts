@@ -453,7 +453,7 @@ export interface PartingState {
 
 /** What a page asks of a run. */
 export interface RunCommand {
-  readonly do: "run" | "pause" | "go" | "step" | "back" | "speed" | "fork" | "choose" | "drop" | "compare" | "halt_at" | "halt_not_at" | "hand" | "drive" | "save";
+  readonly do: "run" | "pause" | "go" | "step" | "back" | "speed" | "fork" | "choose" | "drop" | "compare" | "halt_at" | "halt_not_at" | "hand" | "drive" | "stop" | "save";
   readonly at_ns: number | null;
   readonly unit: "instruction" | "line" | "edge" | "packet" | "event" | "millisecond";
   readonly speed: number;
@@ -483,5 +483,5 @@ export interface RunState {
 
 export type Standing = "" | "passed" | "failed" | "open";
 export type PageBlock = PageTable | PageText | PagePicture | PagePlot | PageList | PagePlan;
-export type Doing = "run" | "pause" | "go" | "step" | "back" | "speed" | "fork" | "choose" | "drop" | "compare" | "halt_at" | "halt_not_at" | "hand" | "drive" | "save";
+export type Doing = "run" | "pause" | "go" | "step" | "back" | "speed" | "fork" | "choose" | "drop" | "compare" | "halt_at" | "halt_not_at" | "hand" | "drive" | "stop" | "save";
 export type StepUnit = "instruction" | "line" | "edge" | "packet" | "event" | "millisecond";
