@@ -8,7 +8,6 @@ import typer
 from p2os.cli.captures.shown_page import HOST, NoBrowser, shown
 from p2os.cli.groups import BENCH
 from p2os.cli.quantities import option
-from p2os.cli.robots.viewed_robot import driven_target
 from p2os.view.run_control import MOST_DPS as FASTEST_DPS
 from p2os.view.run_control import MOST_MPS as FASTEST_MPS
 from p2os.view.targets import target_of
@@ -70,11 +69,12 @@ def view(
     """Show something until Ctrl-C."""
     if not drive and (vel is not None or turn_rate is not None):
         raise UsageError(f"{'--vel' if vel is not None else '--turn-rate'} goes with --drive only", hint="add --drive")
-    if drive:
+    found = target_of(target)
+    if drive and found.driven is None:
+        raise UsageError(f"--drive is for a robot at a port, and {target!r} is none", hint="tcp:, serial: or pty:")
+    if drive and found.driven is not None:
         most_dps = MOST_DPS if turn_rate is None else math.degrees(turn_rate)
-        found = driven_target(target, min(vel or MOST_MPS, FASTEST_MPS), min(most_dps, FASTEST_DPS))
-    else:
-        found = target_of(target)
+        found = found.driven(min(vel or MOST_MPS, FASTEST_MPS), min(most_dps, FASTEST_DPS))
     with shown(found.source, is_opened=not no_browser, host=host, port=port) as page:
         if found.run is not None:
             found.run()

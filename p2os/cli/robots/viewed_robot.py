@@ -15,7 +15,6 @@ from p2os.transport.wall_clock import wall_clock
 from p2os.view.header import HandsOffer
 from p2os.view.targets import ViewTarget
 from p2os.view.watched_line import WatchedConversation
-from simbase.errors import UsageError
 
 #: Of a URL of a line.
 SCHEMES = ("serial:", "tcp:", "pty:")
@@ -55,17 +54,11 @@ def robot_target(named: str) -> ViewTarget | None:
         finally:
             watched.source.end()
 
-    return ViewTarget(source=watched.source, run=run)
+    return ViewTarget(source=watched.source, run=run, driven=partial(_driven_target, named))
 
 
-def driven_target(named: str, most_mps: float, most_dps: float) -> ViewTarget:
-    """Return a robot at a URL that its page drives, no faster than this.
-
-    Raises:
-        UsageError: It is no URL of a line.
-    """
-    if not named.startswith(SCHEMES):
-        raise UsageError(f"--drive is for a robot at a port, and {named!r} is none", hint="tcp:, serial: or pty:")
+def _driven_target(named: str, most_mps: float, most_dps: float) -> ViewTarget:
+    """Return a robot at a URL that its page drives, no faster than this."""
     watched = WatchedConversation(named, "", wall_clock)
     driver, recording = PageDriver(most_mps, most_dps), watched.source.recording
     offer = HandsOffer(is_real=True, most_mps=most_mps, most_dps=most_dps)

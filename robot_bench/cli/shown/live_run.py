@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from p2os.cli.robots.drive_deadman import DriveDeadman
 from p2os.transport.wall_clock import Clock, wall_clock
-from p2os.view.drive_deadman import DriveDeadman
 from p2os.view.header import PageHeader
 from p2os.view.live import LiveRecording
 from p2os.view.recording import ViewRecording

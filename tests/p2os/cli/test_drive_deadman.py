@@ -4,7 +4,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
-from p2os.view.drive_deadman import STILL, DriveDeadman
+from p2os.cli.robots.drive_deadman import STILL, DriveDeadman
 from p2os.view.run_control import DRIVE_HOLD_NS
 
 
