@@ -94,7 +94,7 @@ export class App {
 
   private follow(): void {
     const run = this.store.run.value, beside = this.beside.value, { start_ns } = this.store.all.value;
-    if (!run) return;
+    if (!run || this.store.all.value.hands?.is_real) return; // a robot that is there stands nowhere in time
     batch(() => {
       const looked = run.futures.filter(({ name }) => name === run.future || name === beside);
       const sources = looked.map(({ source }) => source), end_ns = Math.max(start_ns, ...looked.map((one) => one.end_ns));
