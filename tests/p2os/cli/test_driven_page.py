@@ -27,17 +27,17 @@ class Client:
     link = Link.OPEN
 
     def __init__(self) -> None:
-        self.told: list[object] = []
+        self.commanded: list[object] = []
         self.tell: Callable[[Notice], None] = lambda _notice: None
         self.is_lost = False
 
     def set_velocity(self, forward_mps: float, turn_radps: float) -> None:
         if self.is_lost:
             raise LinkLostError("the link was lost")
-        self.told.append((forward_mps, round(math.degrees(turn_radps), 6)))
+        self.commanded.append((forward_mps, round(math.degrees(turn_radps), 6)))
 
     def stop(self) -> None:
-        self.told.append("stop")
+        self.commanded.append("stop")
 
     def on_event(self, callback: Callable[[Notice], None]) -> None:
         self.tell = callback
@@ -52,13 +52,13 @@ class Driven:
         self.client.on_event(self.driver._notices.put)
 
     def turn(self, *commands: RunCommand, after_ns: int = 0) -> list[object]:
-        self.client.told.clear()
+        self.client.commanded.clear()
         self.now += after_ns
         for command in commands:
             assert self.driver.offer(command)
         for _ in commands or [None]:
             self.driver.turn(self.client, 0)
-        return list(self.client.told)
+        return list(self.client.commanded)
 
 
 def test_it_drives_while_a_page_says_so_and_stops_when_it_is_let_go() -> None:
