@@ -17,7 +17,7 @@ StepUnit: TypeAlias = Literal["instruction", "line", "edge", "packet", "event", 
 #: What is done.
 Doing: TypeAlias = Literal[
     "run", "pause", "go", "step", "back", "speed", "fork", "choose", "drop", "compare", "halt_at", "halt_not_at",
-    "watch", "watch_not", "hand", "drive", "save",
+    "watch", "watch_not", "hand", "drive", "stop", "save",
 ]  # fmt: skip
 #: chosen: words of a person in one line.
 MOST_LETTERS = 400
@@ -66,6 +66,7 @@ COMMANDS: Mapping[str, frozenset[str]] = {
     "compare": frozenset({"future"}),
     "hand": frozenset({"at_ns", "words"}),
     "drive": frozenset({"forward_mps", "turn_dps"}),
+    "stop": frozenset(),
     "save": frozenset({"words"}),
     "halt_at": frozenset({"words"}),
     "halt_not_at": frozenset({"number"}),

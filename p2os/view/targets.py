@@ -28,6 +28,8 @@ class ViewTarget:
 
     source: ShownSource
     run: Callable[[], None] | None = None
+    #: Returns it as a robot that its page drives, no faster than m/s and deg/s; None: it is no robot at a port.
+    driven: "Callable[[float, float], ViewTarget] | None" = None
 
 
 class ServedPage(Protocol):

@@ -1,5 +1,6 @@
 """`p2os view`: a run, a capture or whatever else can be shown, on a page in the browser."""
 
+import math
 from typing import Annotated
 
 import typer
@@ -7,14 +8,21 @@ import typer
 from p2os.cli.captures.shown_page import HOST, NoBrowser, shown
 from p2os.cli.groups import BENCH
 from p2os.cli.quantities import option
+from p2os.view.run_control import MOST_DPS as FASTEST_DPS
+from p2os.view.run_control import MOST_MPS as FASTEST_MPS
 from p2os.view.targets import target_of
-from simbase.units import PORT
+from simbase.errors import UsageError
+from simbase.units import PORT, SPEED, TURN_RATE
+
+#: Speeds of a key that is held, as of `p2os teleop`: m/s and deg/s.
+MOST_MPS, MOST_DPS = 0.3, 45.0
 
 HELP = """Look at a run, capture, scenario or robot in the browser.
 
 TARGET is a run folder, a capture (pcap, a recording, hex), a scenario, which is
 then run at the pace of the clock, or the URL of a robot, which is watched and not
-moved. The page is served on this machine alone, and
+moved; with --drive the page drives it: hold a key, the stick or a pad; it stops as
+soon as nothing is held, the page is left, or nothing is heard of it. The page is served on this machine alone, and
 its link holds a token: nobody else gets in. It is there until Ctrl-C.
 
 \b
@@ -23,6 +31,7 @@ Examples:
   p2os view lab.pcap                a conversation with a robot, byte by byte
   p2os view dodge                   the scenario, as it runs
   p2os view tcp:127.0.0.1:8101      a robot, motors off
+  p2os view serial:/dev/ttyUSB0 --drive --vel 150mm/s   driven from the page
   p2os view dodge --no-browser      prints the link alone
 """
 
@@ -34,6 +43,21 @@ def register(app: typer.Typer) -> None:
 
 def view(
     target: Annotated[str, typer.Argument(help="Run folder, capture, scenario, or a robot's URL.", metavar="TARGET")],
+    drive: Annotated[bool, typer.Option("--drive", help="Of a robot at a port: let the page drive it.")] = False,
+    vel: Annotated[
+        float | None,
+        option(SPEED, "--vel", purpose="With --drive: greatest speed.", above_zero=True, shown=f"{MOST_MPS:g}m/s"),
+    ] = None,
+    turn_rate: Annotated[
+        float | None,
+        option(
+            TURN_RATE,
+            "--turn-rate",
+            purpose="With --drive: greatest turning speed.",
+            above_zero=True,
+            shown=f"{MOST_DPS:g}deg/s",
+        ),
+    ] = None,
     no_browser: NoBrowser = False,
     port: Annotated[
         int, option(PORT, "--port", purpose="Where it is served; 0 takes a free one.", least="0", most="65535")
@@ -43,7 +67,14 @@ def view(
     ] = HOST,
 ) -> None:
     """Show something until Ctrl-C."""
+    if not drive and (vel is not None or turn_rate is not None):
+        raise UsageError(f"{'--vel' if vel is not None else '--turn-rate'} goes with --drive only", hint="add --drive")
     found = target_of(target)
+    if drive and found.driven is None:
+        raise UsageError(f"--drive is for a robot at a port, and {target!r} is none", hint="tcp:, serial: or pty:")
+    if drive and found.driven is not None:
+        most_dps = MOST_DPS if turn_rate is None else math.degrees(turn_rate)
+        found = found.driven(min(vel or MOST_MPS, FASTEST_MPS), min(most_dps, FASTEST_DPS))
     with shown(found.source, is_opened=not no_browser, host=host, port=port) as page:
         if found.run is not None:
             found.run()

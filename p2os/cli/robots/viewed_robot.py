@@ -1,14 +1,18 @@
 """A robot at a port on a page: what `--view` of the verbs does that hold one, and `p2os view URL`."""
 
 import contextlib
+import math
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import partial
 
 from p2os.cli.captures.shown_page import shown
-from p2os.cli.held_robot import held
+from p2os.cli.held_robot import held, say_what_is_beyond
+from p2os.cli.robots.driven_page import PageDriver
 from p2os.client import Robot
 from p2os.transport import Transport, open_url
 from p2os.transport.wall_clock import wall_clock
+from p2os.view.header import HandsOffer
 from p2os.view.targets import ViewTarget
 from p2os.view.watched_line import WatchedConversation
 
@@ -47,6 +51,25 @@ def robot_target(named: str) -> ViewTarget | None:
             with held(Robot(named, auto_enable=False, opener=partial(_watched, watched))) as client:
                 while True:
                     client.sleep(_LOOK_S)
+        finally:
+            watched.source.end()
+
+    return ViewTarget(source=watched.source, run=run, driven=partial(_driven_target, named))
+
+
+def _driven_target(named: str, most_mps: float, most_dps: float) -> ViewTarget:
+    """Return a robot at a URL that its page drives, no faster than this."""
+    watched = WatchedConversation(named, "", wall_clock)
+    driver, recording = PageDriver(most_mps, most_dps), watched.source.recording
+    offer = HandsOffer(is_real=True, most_mps=most_mps, most_dps=most_dps)
+    recording.header = replace(recording.header, hands=offer)
+    watched.source.control = driver
+
+    def run() -> None:
+        try:
+            with held(Robot(named, opener=partial(_watched, watched)), moves=True) as client:
+                say_what_is_beyond(client.limits, speed_mps=most_mps, rate_radps=math.radians(most_dps))
+                driver.drive(client)
         finally:
             watched.source.end()
 

@@ -44,7 +44,7 @@ MOST_SIGNALS = 8
 #: chosen: what hands did last is listed.
 MOST_HANDS = 20
 #: What is done beside a run that goes on: where it cannot be, the run goes on.
-_BESIDE = frozenset({"hand", "drive", "save"})
+_BESIDE = frozenset({"hand", "drive", "stop", "save"})
 #: chosen: slower than this, what happens is looked for ahead of the time that is shown: else it would come late.
 _SLOW = 0.25
 #: chosen: a bench that cannot keep the pace goes on from where it is after so long, ns of the clock.
@@ -105,7 +105,8 @@ class RunSession:
         self._doing: Mapping[Doing, Callable[[RunCommand], None]] = {
             "run": self._run, "pause": self._pause, "go": self._go, "step": self._step, "back": self._back,
             "speed": self._set_speed, "fork": self._fork, "choose": self._choose, "drop": self._drop,
-            "compare": self._compare, "hand": self._hand, "drive": self._drive, "save": self._save,
+            "compare": self._compare, "hand": self._hand, "drive": self._drive, "stop": self._drive,
+            "save": self._save,
             "halt_at": self._halt_at, "halt_not_at": self._halt_not_at,
             "watch": self._watch, "watch_not": self._watch_not,
         }  # fmt: skip

@@ -19,11 +19,12 @@ from tempfile import TemporaryDirectory
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.program.image import load_image
 from bluepill_sim.program.variables import read_variables
+from p2os.cli.robots.drive_deadman import DriveDeadman
 from p2os.transport.wall_clock import Clock, wall_clock
 from p2os.view.header import PageHeader
 from p2os.view.live import LiveRecording
 from p2os.view.recording import ViewRecording
-from p2os.view.run_control import DRIVE_HOLD_NS, RunCommand, RunState
+from p2os.view.run_control import MOST_DPS, MOST_MPS, RunCommand, RunState
 from robot_bench.bench import Bench, run_of
 from robot_bench.cli.debugging.future import Future, SeenStretch
 from robot_bench.cli.debugging.session import MAIN, RunSession
@@ -136,8 +137,7 @@ class LiveRun:
         #: The run's own, and what is written there.
         self._run_folder: Path | None = None
         self._written: Sequence[Hand] = ()
-        #: Until when who drives was heard of, ns of the clock; None: nobody drives.
-        self._drives_until: Nanos | None = None
+        self._drive = DriveDeadman(MOST_MPS, MOST_DPS)
         #: Whether it goes on to be controlled when the run is over, by `stay`.
         self.stays = False
         #: What a server shows.
@@ -202,8 +202,10 @@ class LiveRun:
     def _turn(self, session: RunSession) -> None:
         """Do a command, or run a slice."""
         now = self._clock()
-        if self._drives_until is not None and now >= self._drives_until:
-            self._do(session, RunCommand(do="drive"))
+        if self._drive.is_driving:
+            self._drive.advance_to(now)
+            if not self._drive.is_driving:
+                self._do(session, RunCommand(do="stop"))
         wait_s = session.go_on(now) if session.is_running else _WAIT_S
         self._hand_over_variables(session)
         self._show(session.state())
@@ -217,10 +219,14 @@ class LiveRun:
 
     def _do(self, session: RunSession, command: RunCommand) -> None:
         """Do what was asked for."""
-        session.do(command)
         if command.do == "drive":
-            is_driving = bool(command.forward_mps or command.turn_dps)
-            self._drives_until = self._clock() + DRIVE_HOLD_NS if is_driving else None
+            self._drive.ask(command.forward_mps, command.turn_dps, self._clock())
+        elif command.do == "stop":
+            self._drive.stop()
+        if command.do in {"drive", "stop"}:
+            forward_mps, turn_dps = self._drive.speeds
+            command = RunCommand(do="drive", forward_mps=forward_mps, turn_dps=turn_dps)
+        session.do(command)
         if session.hands != self._written and self._run_folder is not None:
             self._written = session.hands
             self._write(HANDS_NAME, scenario_text(self._scenario, self._written, self._run_folder))

@@ -8,7 +8,7 @@ import type { App } from "../src/shell/app";
 import { signal } from "@preact/signals";
 
 const asked: { do: string; forward_mps?: number; turn_dps?: number; words?: string }[] = [], trouble = signal("");
-const app = { store: { trouble, header: signal({ hands: { most_mps: 0.5, most_dps: 90, is_real: false } }) }, ask: (command: typeof asked[number]) => asked.push(command) } as unknown as App;
+const app = { stops: signal(0), store: { trouble, header: signal({ hands: { most_mps: 0.5, most_dps: 90, is_real: false } }) }, ask: (command: typeof asked[number]) => asked.push(command) } as unknown as App;
 let driving: Driving, end: () => void;
 
 beforeEach(() => {

@@ -30,7 +30,7 @@ export class Driving {
     window.addEventListener("blur", stop);
     window.addEventListener("pagehide", stop);
     document.addEventListener("visibilitychange", hidden);
-    const lost = effect(() => { if (this.app.store.trouble.value) this.stop(); });
+    const lost = effect(() => { if (this.app.store.trouble.value || this.app.stops.value) this.stop(); });
     this.timer = setInterval(() => this.turn(), SAID_MS);
     return () => {
       this.stop();

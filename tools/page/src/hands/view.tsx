@@ -20,7 +20,7 @@ function Hands({ app, driving }: { app: App; driving: Driving }) {
   return (
     <div class="hands" tabIndex={0} role="region" aria-label="What hands can do">
       {offer.most_mps > 0 && <Drive app={app} driving={driving} />}
-      {!offer.is_real && <><Things app={app} /><Faults app={app} /><Board app={app} /><Done app={app} /></>}
+      {offer.is_real ? <button type="button" class="stop" onClick={() => app.stop()}>STOP</button> : <><Things app={app} /><Faults app={app} /><Board app={app} /><Done app={app} /></>}
     </div>
   );
 }

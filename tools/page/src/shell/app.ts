@@ -25,6 +25,8 @@ export class App {
   readonly unit: Signal<StepUnit> = signal("event");
   /** The future that is looked at beside the chosen one. */
   readonly beside: Signal<string | null> = signal(null);
+  /** Counts up when the robot was stopped. */
+  readonly stops = signal(0);
   /** From which answer on now goes with the run again: it was asked to move. */
   private awaited = Infinity;
 
@@ -39,7 +41,18 @@ export class App {
 
   /** Whether this page controls a run. */
   get controls(): boolean {
-    return this.store.run.value !== null && this.store.mayControl.value;
+    return this.store.run.value !== null && this.store.mayControl.value && !this.store.header.value.hands?.is_real;
+  }
+
+  /** Whether this page drives a robot that is there. */
+  get drives(): boolean {
+    return this.store.run.value !== null && this.store.mayControl.value && this.store.header.value.hands?.is_real === true;
+  }
+
+  /** Stops a robot that is there; what is held has to be pressed anew. */
+  stop(): void {
+    this.ask({ do: "stop" });
+    this.stops.value++;
   }
 
   /** Lets time go on, or stand still: the run's, where this page controls it. */
@@ -81,7 +94,7 @@ export class App {
 
   private follow(): void {
     const run = this.store.run.value, beside = this.beside.value, { start_ns } = this.store.all.value;
-    if (!run) return;
+    if (!run || this.store.all.value.hands?.is_real) return; // a robot that is there stands nowhere in time
     batch(() => {
       const looked = run.futures.filter(({ name }) => name === run.future || name === beside);
       const sources = looked.map(({ source }) => source), end_ns = Math.max(start_ns, ...looked.map((one) => one.end_ns));

@@ -17,6 +17,7 @@ const step = (share: number) => (app: App) => app.clock.seek(app.clock.now.peek(
 
 export const KEYS: readonly Key[] = [
   { keys: "Space", does: "play or pause; a run that this page controls goes on or stands still", matches: one(" "), run: (app) => app.toggle() },
+  { keys: "Escape", does: "stop a robot that this page drives", matches: one("Escape"), run: (app) => { if (app.drives) app.stop(); } },
   { keys: "s, Shift s", does: "of such a run: a step on, a step back", matches: one("s"), run: (app) => app.step(1) },
   { keys: "", does: "", matches: one("S"), run: (app) => app.step(-1) },
   { keys: "← →", does: "a hundredth of the window back or on", matches: one("ArrowLeft", false), run: step(-0.01) },

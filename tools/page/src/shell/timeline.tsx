@@ -32,7 +32,8 @@ export function Timeline({ app }: { app: App }) {
       </select>
       <Scrub app={app} />
       <output class="now" aria-live="off">{moment(clock.now.value, clock.span.value / 1000)}</output>
-      {run && <p class="run-why" role="status">{run.is_running ? "the run goes on" : `the run stands still${run.why ? `: ${run.why}` : ""}`}</p>}
+      {app.drives && <button type="button" class="stop" onClick={() => app.stop()}>STOP</button>}
+      {run && app.drives ? <p class={run.trouble ? "run-why trouble" : "run-why"} role="status">{run.trouble || run.why}</p> : run && <p class="run-why" role="status">{run.is_running ? "the run goes on" : `the run stands still${run.why ? `: ${run.why}` : ""}`}</p>}
     </section>
   );
 }
