@@ -15,6 +15,7 @@ import shutil
 import subprocess
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import cast
 
@@ -87,7 +88,8 @@ class HeadlessPage:
         command: dict[str, object] = {"id": self._number, "method": method, "params": about}
         if self._session:
             command["sessionId"] = self._session
-        os.write(self._commands, json.dumps(command).encode() + b"\0")
+        with contextlib.suppress(BrokenPipeError):  # it has ended: its answer does not come either
+            os.write(self._commands, json.dumps(command).encode() + b"\0")
         while True:
             answer = self._next()
             if answer.get("id") != self._number:
@@ -130,9 +132,16 @@ def headless_page() -> Iterator[HeadlessPage]:
         ]  # fmt: skip
         ends.callback(os.close, commands)
         ends.callback(os.close, answers)
-        # Its descriptors 3 and 4, whatever ours are.
-        shell = ["/bin/sh", "-c", f'exec 3<&{theirs_in} 4>&{theirs_out}; exec "$@"', "sh", program, *words]
-        browser = subprocess.Popen(
+        # Its descriptors 3 and 4, whatever ours are; a shell's <& takes one digit alone.
+        shell = [
+            "/bin/sh",
+            "-c",
+            f'exec 3</dev/fd/{theirs_in} 4>/dev/fd/{theirs_out}; exec "$@"',
+            "sh",
+            program,
+            *words,
+        ]
+        browser = subprocess.Popen(  # noqa: S603 - one of `BROWSERS`
             shell, pass_fds=(theirs_in, theirs_out), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )  # fmt: skip
@@ -147,4 +156,4 @@ def headless_page() -> Iterator[HeadlessPage]:
             browser.kill()
             browser.wait()
             shutil.rmtree(folder, ignore_errors=True)
-            os.makedirs(folder, exist_ok=True)
+            Path(folder).mkdir(exist_ok=True)  # what the block takes away is there

@@ -15,6 +15,7 @@ import typer
 from p2os.cli.captures.headless import HeadlessPage, headless_page
 from p2os.cli.groups import BENCH
 from p2os.cli.quantities import option
+from p2os.errors import RunFailedError
 from p2os.view.page import page_of
 from p2os.view.targets import target_of
 from simbase.errors import MissingDependencyError, UsageError
@@ -25,7 +26,8 @@ from simbase.units import FACTOR, TIME
 HELP = """Draw a run, or a capture, as a picture or a film.
 
 The page of `p2os view` draws it, in a Chromium or Chrome without a window. What comes
-out is what the file's ending says: png, gif or mp4 (gif needs Pillow, mp4 ffmpeg).
+out is what the file's ending says: png, svg (the plan), gif (needs Pillow) or mp4
+(needs ffmpeg).
 
 \b
 Examples:
@@ -35,6 +37,8 @@ Examples:
   p2os render runs/dodge-001 -o run.mp4 --from 1s --to 6s --speed 2
 """
 VIEWS = ("plan", "scene", "logic", "plots", "packets", "consoles", "events", "goals", "states", "report")
+#: Those that are one drawing of lines, which an SVG can hold; and pictures that do not move.
+DRAWINGS, STILLS = ("plan",), (".png", ".svg")
 #: chosen: a film of more is no film, and each is drawn in some tenths of a second.
 MOST_FRAMES = 1500
 _LEAST_PX, _MOST_PX = 200, 4000
@@ -65,7 +69,7 @@ def register(app: typer.Typer) -> None:
 def render(
     target: Annotated[str, typer.Argument(help="Run folder or capture.", metavar="RUN")],
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="The picture: .png, .gif or .mp4.", metavar="FILE")
+        Path | None, typer.Option("--out", "-o", help="The picture: .png, .svg, .gif, .mp4.", metavar="FILE")
     ] = None,
     at_ns: Annotated[Nanos | None, option(TIME, "--at", purpose="Of a picture: when; default the end.")] = None,
     from_ns: Annotated[Nanos | None, option(TIME, "--from", purpose="Of a film: its beginning.")] = None,
@@ -85,11 +89,14 @@ def render(
     path = out or Path(f"{Path(target).resolve().name}.png")
     write = _writer_of(path)
     width, height = _size_of(size)
+    view = view or ("plan" if path.suffix == ".svg" else "")
     if view and view not in VIEWS:
         raise UsageError(f"there is no view {view!r}", hint=", ".join(VIEWS))
+    if path.suffix == ".svg" and view not in DRAWINGS:
+        raise UsageError(f"{view} is no one drawing of lines", hint=f"--view {' or '.join(DRAWINGS)}; or a .png")
     recording = target_of(target).source.recording
     start, end = recording.header.start_ns, recording.header.end_ns
-    if path.suffix == ".png":
+    if path.suffix in STILLS:
         wanted = end if at_ns is None else at_ns
         film = Film(times=(max(start, min(end, wanted)),), pace_hz=fps)
     else:
@@ -104,7 +111,11 @@ def render(
         if view and not page.evaluate(_ALONE % view):
             raise UsageError(f"this run has no {view}", hint="another --view")
         with writing(path.parent):
-            write(path, _pictures(page, film), film.pace_hz)
+            if path.suffix == ".svg":
+                page.evaluate(f"window.p2osPage.app.clock.seek({film.times[0]}); {_DRAWN}")
+                _write_svg(page, path, view)
+            else:
+                write(path, _pictures(page, film), film.pace_hz)
     typer.echo(f"{path}: {len(film.times)} picture{'s' if len(film.times) > 1 else ''} of {width} x {height}")
 
 
@@ -124,6 +135,14 @@ def _film(start: Nanos, end: Nanos, speed: float, fps: float) -> Film:
     return Film(times=(*(start + round(number * step) for number in range(count)),), pace_hz=fps)
 
 
+def _write_svg(page: HeadlessPage, path: Path, view: str) -> None:
+    """Write a view that is one drawing, as what draws it on the screen draws it into an SVG."""
+    text = page.evaluate(f"window.p2osPage.svgOf(document.querySelector('.view-{view} canvas.surface'))")
+    if not isinstance(text, str):
+        raise RunFailedError(f"the page has drawn no {view}")
+    path.write_text(text, encoding="utf-8")
+
+
 def _write_png(path: Path, pictures: Iterator[bytes], _pace_hz: float) -> None:
     path.write_bytes(next(pictures))
 
@@ -136,20 +155,23 @@ def _write_gif(path: Path, pictures: Iterator[bytes], pace_hz: float) -> None:
     colours = found[-1].quantize(64)
     frames = [one.quantize(palette=colours, dither=Image.Dither.NONE) for one in found]
     frames[0].save(
-        path, save_all=True, append_images=frames[1:], duration=round(1000 / pace_hz), loop=0, optimize=False, disposal=1
+        path, save_all=True, append_images=frames[1:], duration=round(1000 / pace_hz), loop=0,
+        optimize=False, disposal=1,
     )  # fmt: skip
 
 
 def _write_mp4(path: Path, pictures: Iterator[bytes], pace_hz: float) -> None:
     command = ["ffmpeg", "-y", "-loglevel", "error", "-f", "image2pipe", "-framerate", f"{pace_hz:g}", "-i", "-",
                "-pix_fmt", "yuv420p", "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", str(path)]  # fmt: skip
-    done = subprocess.run(command, input=b"".join(pictures), capture_output=True, check=False)
+    done = subprocess.run(  # noqa: S603 - ffmpeg with our own words
+        command, input=b"".join(pictures), capture_output=True, check=False
+    )
     if done.returncode:
         raise UsageError(f"ffmpeg: {done.stderr.decode('utf-8', 'replace').strip()[-300:]}")
 
 
 _Write = Callable[[Path, Iterator[bytes], float], None]
-_WRITERS: Mapping[str, _Write] = {".png": _write_png, ".gif": _write_gif, ".mp4": _write_mp4}
+_WRITERS: Mapping[str, _Write] = {".png": _write_png, ".svg": _write_png, ".gif": _write_gif, ".mp4": _write_mp4}
 
 
 def _writer_of(path: Path) -> _Write:
@@ -174,6 +196,6 @@ def _writer_of(path: Path) -> _Write:
 
 def _size_of(text: str) -> tuple[int, int]:
     found = [int(word) for word in text.lower().split("x") if word.isdecimal()]
-    if len(found) != 2 or not all(_LEAST_PX <= one <= _MOST_PX for one in found):  # noqa: PLR2004 - width and height
+    if len(found) != 2 or not all(_LEAST_PX <= one <= _MOST_PX for one in found):
         raise UsageError(f"{text!r} is no size", hint=f"such as 1400x900, each from {_LEAST_PX} to {_MOST_PX}")
     return cast("tuple[int, int]", tuple(found))
