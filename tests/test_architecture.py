@@ -47,6 +47,7 @@ ALLOWED = {
     "p2os.pioneer.world.formats": {"yaml", "PIL"},
     "p2os.pioneer.body.mujoco": {"mujoco", "numpy"},
     "p2os.cli.robots.pad_source": {"pygame"},
+    "p2os.cli.captures.render": {"typer", "PIL"},
     "p2os.view": {"construct"},
     "p2os.view.server": {"starlette"},
     "p2os.view.server.serving": {"uvicorn"},

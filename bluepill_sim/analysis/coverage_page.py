@@ -10,8 +10,7 @@ from pathlib import Path
 
 from bluepill_sim.analysis.coverage import Coverage, FileCoverage
 from bluepill_sim.analysis.coverage_text import coverage_lines
-from simbase.errors import FileError
-from simbase.files import read_text
+from bluepill_sim.program.line_table import source_lines
 
 _STYLE = """
 body{font:15px system-ui,sans-serif;margin:1.5rem auto;max-width:72rem;padding:0 1rem;color:#1b1b1b;background:#fdfcf8}
@@ -68,16 +67,3 @@ def _listing(file: FileCoverage, sources: Path | None) -> Iterator[str]:
         cells = ("" if count is None else str(count), ways, str(number), line)
         yield f'<tr class="{kind}">' + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
     yield "</table></details>"
-
-
-def source_lines(name: str, sources: Path | None) -> list[str]:
-    """Return the lines of a source file: where it was built, or in the folder given, or nothing."""
-    candidates = [Path(name)] if Path(name).is_absolute() else []
-    if sources is not None:
-        candidates += [sources / name, sources / Path(name).name]
-    for path in candidates:
-        try:
-            return read_text(path, errors="replace").splitlines()
-        except FileError:
-            continue
-    return []

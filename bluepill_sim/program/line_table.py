@@ -11,13 +11,15 @@ import io
 from bisect import bisect_right
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from pathlib import Path
 from typing import Any
 
 from bluepill_sim.errors import ImageError
 from bluepill_sim.program.elf_file import file_bytes
 from bluepill_sim.program.image import Image
 from bluepill_sim.stm32f103 import FLASH_BYTES_FITTED, SRAM_BASE, SRAM_BYTES
-from simbase.errors import MissingDependencyError
+from simbase.errors import FileError, MissingDependencyError
+from simbase.files import read_text
 
 _ELF_MAGIC = b"\x7fELF"
 
@@ -92,6 +94,19 @@ def _lines_of(elf_bytes: bytes, flash: int) -> LineTable:
         if program is not None:
             rows += _rows_of(program, _Files(program, unit), flash)
     return LineTable(_without_overlaps(rows))
+
+
+def source_lines(name: str, sources: Path | None) -> list[str]:
+    """Return the lines of a source file: where it was built, or in the folder given, or nothing."""
+    candidates = [Path(name)] if Path(name).is_absolute() else []
+    if sources is not None:
+        candidates += [sources / name, sources / Path(name).name]
+    for path in candidates:
+        try:
+            return read_text(path, errors="replace").splitlines()
+        except FileError:
+            continue
+    return []
 
 
 class _Files:

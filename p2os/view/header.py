@@ -262,7 +262,39 @@ class PagePlan:
     places: Sequence[tuple[float, float, str]] = ()
 
 
-PageBlock: TypeAlias = PageTable | PageText | PagePicture | PagePlot | PageList | PagePlan
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PictureShape:
+    """A shape of a drawing; lengths in those of the drawing, y down."""
+
+    #: `box` from its corner, `circle` around its middle with `width` as radius, `text` at its baseline.
+    kind: Literal["box", "circle", "text"]
+    x: float
+    y: float
+    width: float = 0.0
+    height: float = 0.0
+    text: str = ""
+    align: Literal["start", "middle", "end"] = "start"
+    #: What it stands for, which decides its colour: `board`, `chip`, `metal`, `lit`, `unlit`, `high`, `low`, `wave`,
+    #: `floating`, `supply`, `on-board`.
+    role: str = ""
+    #: Shown of a shape that is pointed at.
+    title: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PageDrawing:
+    """A drawing of shapes."""
+
+    kind: Literal["drawing"] = "drawing"
+    title: str = ""
+    #: What it shows, in words.
+    alt: str = ""
+    width: float = 100.0
+    height: float = 100.0
+    shapes: Sequence[PictureShape] = ()
+
+
+PageBlock: TypeAlias = PageTable | PageText | PagePicture | PagePlot | PageList | PagePlan | PageDrawing
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -274,6 +306,26 @@ class PageSection:
     blocks: Sequence[PageBlock] = ()
     #: Closed until who reads opens it.
     is_folded: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PanelHeader:
+    """A panel: a view of what runs, as it is now."""
+
+    name: str
+    title: str
+    #: What one may look at in it; none: it is one thing.
+    choices: Sequence[str] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PanelState:
+    """What a panel shows."""
+
+    name: str
+    choice: str
+    at_ns: Nanos
+    sections: Sequence[PageSection] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -299,6 +351,8 @@ class PageHeader:
     #: What hands can do; None: nothing.
     hands: HandsOffer | None = None
     sections: Sequence[PageSection] = ()
+    #: Of a run that goes on.
+    panels: Sequence[PanelHeader] = ()
     #: A line for each kind of rows of which the page has not all.
     left_out: Sequence[str] = ()
     footer: str = ""
@@ -338,10 +392,13 @@ class Answered:
     may_control: bool | None = None
     #: Names of variables, for one that was begun.
     offered: Sequence[str] | None = None
+    #: What the panel shows that is looked at, when that changes.
+    panel: PanelState | None = None
 
 
 __all__ = [
-    "Answered", "ChannelHeader", "FaultOffer", "HandsOffer", "PageBlock", "PageCell", "PageCurve", "PageHeader",
-    "PageList", "PagePicture", "PagePlan", "PagePlot", "PageSection", "PageTable", "PageText", "RobotHeader",
-    "SensorPlace", "Standing", "StateTransition", "Wanted", "WordOffer", "WorldHeader", "WorldThing",
+    "Answered", "ChannelHeader", "FaultOffer", "HandsOffer", "PageBlock", "PageCell", "PageCurve", "PageDrawing",
+    "PageHeader", "PageList", "PagePicture", "PagePlan", "PagePlot", "PageSection", "PageTable", "PageText",
+    "PanelHeader", "PanelState", "PictureShape", "RobotHeader", "SensorPlace", "Standing", "StateTransition",
+    "Wanted", "WordOffer", "WorldHeader", "WorldThing",
 ]  # fmt: skip

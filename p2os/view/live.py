@@ -11,14 +11,31 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Generic, Protocol, TypeVar
 
-from p2os.view.header import PageHeader, PageSection
+from p2os.view.header import PageHeader, PageSection, PanelState
 from p2os.view.recording import ViewRecording
-from p2os.view.run_control import RunControl
+from p2os.view.run_control import RunCommand, RunState
 from simbase.timing import Nanos
 
 Happening = TypeVar("Happening")
 #: chosen: a minute of a run whose page is stalled; some tens of megabytes.
 MOST_WAITING = 50_000
+
+
+class RunControl(Protocol):
+    """A run that is controlled: commands go in, its state comes out; both from any thread."""
+
+    @property
+    def state(self) -> RunState:
+        """How it stands."""
+
+    def offer(self, command: RunCommand) -> bool:
+        """Take a command; False where too many wait."""
+
+    def offered(self, begun: str) -> Sequence[str]:
+        """Return names of variables that what was typed may become."""
+
+    def look(self, panel: str, choice: str) -> PanelState | None:
+        """Return what a panel showed last; who asks again is shown what it has then. None: nothing yet."""
 
 
 class ShownSource(Protocol):

@@ -8,7 +8,7 @@ Invariant: a command is one of `COMMANDS`, with the fields that its row names an
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal, Protocol, TypeAlias, cast, get_args
+from typing import Literal, TypeAlias, cast, get_args
 
 from simbase.timing import NS_PER_MS, Nanos
 
@@ -152,20 +152,6 @@ class RunState:
     hands: Sequence[HandState] = ()
     #: Where hands were written down, in a line.
     saved: str = ""
-
-
-class RunControl(Protocol):
-    """A run that is controlled: commands go in, its state comes out; both from any thread."""
-
-    @property
-    def state(self) -> RunState:
-        """How it stands."""
-
-    def offer(self, command: RunCommand) -> bool:
-        """Take a command; False where too many wait."""
-
-    def offered(self, begun: str) -> Sequence[str]:
-        """Return names of variables that what was typed may become."""
 
 
 class CommandError(Exception):

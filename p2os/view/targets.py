@@ -4,13 +4,14 @@ An entry point of `GROUP` is a function that takes what was named and returns a 
 another kind; they are asked in the order of their names.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, cast
 
 from p2os.view.capture_recording import open_recording
+from p2os.view.header import PageSection, PanelHeader
 from p2os.view.live import ShownSource, StillRecording
 from simbase.entry_points import installed_points
 from simbase.errors import FileError, MissingDependencyError, UsageError
@@ -18,6 +19,8 @@ from simbase.installation import way_to_plug_in
 from simbase.user_classes import loaded
 
 GROUP = "p2os.view_sources"
+#: What shows the inside of what runs: a function of it that returns a `ViewPanel`, or None where it is of another kind.
+PANELS = "p2os.view_panels"
 #: Who serves a page.
 SERVERS = "p2os.view_servers"
 
@@ -30,6 +33,30 @@ class ViewTarget:
     run: Callable[[], None] | None = None
     #: Returns it as a robot that its page drives, no faster than m/s and deg/s; None: it is no robot at a port.
     driven: "Callable[[float, float], ViewTarget] | None" = None
+
+
+@dataclass(frozen=True, slots=True)
+class ViewPanel:
+    """A view of what runs, as it is now."""
+
+    name: str
+    title: str
+    #: What one may look at in it; none: it is one thing.
+    choices: Sequence[str]
+    #: Returns what it shows of a choice; called while all stands still, at most ten times a second. It changes nothing.
+    look: Callable[[str], Sequence[PageSection]]
+
+    @property
+    def header(self) -> PanelHeader:
+        """What the page knows of it from the start."""
+        return PanelHeader(name=self.name, title=self.title, choices=self.choices)
+
+
+def panels_of(subject: object) -> list[ViewPanel]:
+    """Return the panels of what runs, in the order of their entry points' names."""
+    points = sorted(installed_points(PANELS).items())
+    made = [cast("Callable[[object], ViewPanel | None]", loaded(point))(subject) for _, point in points]
+    return [one for one in made if one is not None]
 
 
 class ServedPage(Protocol):

@@ -18,7 +18,7 @@ from typing import Self, cast
 
 from bluepill_sim.program.variables import Variable
 from robot_bench.events.codec import LAST_NS, Json, TraceError, damaged, entries_of
-from simbase.files import lines_of
+from simbase.files import lines_of, open_to_write_text
 from simbase.timing import Nanos
 
 VARIABLES_NAME = "variables.jsonl"
@@ -46,14 +46,14 @@ class VariableWriter:
         variables: What is recorded.
 
     Raises:
-        OSError: It cannot be written.
+        FileError: It cannot be written.
     """
 
     def __init__(self, folder: Path, variables: Sequence[Variable]) -> None:
         self._places = {one.name: place for place, one in enumerate(variables)}
         self._rows: list[tuple[list[Nanos], list[float | None]]] = [([], []) for _ in variables]
         self._last = [-1] * len(variables)
-        self._file = (folder / VARIABLES_NAME).open("w", encoding="utf-8")
+        self._file = open_to_write_text(folder / VARIABLES_NAME)
         named = [{"name": one.name, "type": one.type_name} for one in variables]
         self._write({"v": VERSION, "variables": named})
 

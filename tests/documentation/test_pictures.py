@@ -32,15 +32,15 @@ def test_the_drawing_of_a_world_is_the_worlds() -> None:
 
 def test_a_picture_that_is_old_or_missing_or_made_by_hand_is_named(tmp_path: Path) -> None:
     shutil.copytree(PICTURES, tmp_path, dirs_exist_ok=True)
-    old, gone = tmp_path / "demo.png", tmp_path / "board" / "sim-reset.png"
+    old, gone = tmp_path / "demo.gif", tmp_path / "board" / "sim-reset.png"
     picture = old.read_bytes()
     digit = picture.index(b"inputs\0") + len(b"inputs\0")
     old.write_bytes(picture[:digit] + (b"1" if picture[digit : digit + 1] == b"0" else b"0") + picture[digit + 1 :])
     gone.unlink()
-    old.with_name("mine.png").write_bytes(picture)
+    old.with_name("mine.gif").write_bytes(picture)
     code, said = check(tmp_path)
     assert code == 1
     assert said.splitlines() == [
-        "demo.png: its inputs have changed", "board/sim-reset.png: missing", "mine.png: no command makes it",
+        "demo.gif: its inputs have changed", "board/sim-reset.png: missing", "mine.gif: no command makes it",
         "hint: make pictures",
     ]  # fmt: skip

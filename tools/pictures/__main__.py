@@ -3,11 +3,12 @@
 Usage: python -m tools.pictures [--check] [--all] [--folder DIR]
 
 Each picture carries a hash of its inputs (scenario and firmware, the board's files,
-and the code that draws) as a PNG text chunk. Without options the pictures whose inputs have
+and the code that draws) as a PNG text chunk, or a comment of a GIF. Without options the pictures whose inputs have
 changed are made anew. `--check` makes none, names them, and ends with 1 where there are any.
 
 Not an input: how chip and robot are simulated. The demo's path is one that the bench drove.
-Pictures of the board need KiCad 9, pdftoppm, and ngspice (tools/install_board_tools.sh).
+The film of the demonstration needs Chromium and Pillow; pictures of the board need KiCad 9,
+pdftoppm, and ngspice (tools/install_board_tools.sh).
 """
 
 import argparse
@@ -32,8 +33,13 @@ PICTURES = ROOT / "docs" / "pictures"
 #: The text chunk's keyword.
 KEYWORD = b"inputs"
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
+#: Of a GIF: how it begins, and how a comment does; a stamp is the keyword, a 0, and 64 digits (GIF89a, 24).
+GIF, COMMENT = b"GIF89a", b"\x21\xfe"
+STAMP_BYTES = len(KEYWORD) + 1 + 64
 WORLDS = "p2os/pioneer/world/worlds"
-REPORT = tuple(f"robot_bench/report/{name}.py" for name in ("drawn", "plan", "plots", "thinning"))
+PLAN = "tools/page/src/views/plan/*.ts*"
+#: How the demonstration is filmed: 120 s in 7.5 s.
+FILM = ("--view", "plan", "--size", "560x460", "--speed", "16", "--fps", "8")
 BOARD = "hardware/pcb/outputs/pictures.py"
 
 
@@ -63,8 +69,8 @@ class Group:
 
 def groups() -> Iterator[Group]:
     """Yield all that docs/pictures holds."""
-    files = ("robot_bench/scenarios/dodge.toml", f"{WORLDS}/room.toml", "robot_bench/firmware/dodge.elf", *REPORT)
-    yield Group(names=("demo.png",), files=files, make=make_demo)
+    files = ("robot_bench/scenarios/dodge.toml", f"{WORLDS}/room.toml", "robot_bench/firmware/dodge.elf", PLAN)
+    yield Group(names=("demo.gif",), files=files, make=make_demo, text=" ".join(FILM))
     files = ("bluepill_sim/parts/*.py", "tests/bluepill_sim/firmware/parts.elf", "tools/pictures/parts.py")
     yield Group(names=("parts.png",), files=files, make=make_parts)
     yield Group(names=("silicon.png",), files=("tools/pictures/wiring.py",), make=make_wiring)
@@ -86,16 +92,15 @@ def groups() -> Iterator[Group]:
 
 
 def make_demo() -> None:
-    """Run the demonstration and keep its path."""
+    """Run the demonstration, and film it on the page without a window."""
     from p2os.cli.main import run
-    from robot_bench.report import make_report
 
     with tempfile.TemporaryDirectory() as folder, Path(os.devnull).open("w") as null, contextlib.redirect_stdout(null):
         target = Path(folder) / "demo"
         if run(["run", "dodge", "--out", str(target)]):
             raise SystemExit("pictures: the demonstration failed")
-        make_report(target)
-        (PICTURES / "demo.png").write_bytes((target / "path.png").read_bytes())
+        if run(["render", str(target), "-o", str(PICTURES / "demo.gif"), *FILM]):
+            raise SystemExit("pictures: the demonstration was not filmed (hint: apt-get install chromium)")
 
 
 def make_parts() -> None:
@@ -131,7 +136,10 @@ def make_plot(deck: object) -> None:
 
 
 def stamp_of(picture: bytes) -> str:
-    """Return the hash that a PNG carries; empty where it carries none."""
+    """Return the hash that a PNG or GIF carries; empty where it carries none."""
+    if picture.startswith(GIF):
+        _, _, behind = picture.rpartition(COMMENT + bytes([STAMP_BYTES]) + KEYWORD + b"\0")
+        return behind[: STAMP_BYTES - len(KEYWORD) - 1].decode("latin-1")
     at = len(SIGNATURE)
     while at < len(picture):
         (length,) = struct.unpack_from(">I", picture, at)
@@ -143,7 +151,9 @@ def stamp_of(picture: bytes) -> str:
 
 
 def stamped(picture: bytes, inputs: str) -> bytes:
-    """Return a PNG with the hash of its inputs after its header."""
+    """Return a PNG with the hash of its inputs after its header, or a GIF with it as a comment at its end."""
+    if picture.startswith(GIF):
+        return picture[:-1] + COMMENT + bytes([STAMP_BYTES]) + KEYWORD + b"\0" + inputs.encode() + b"\0" + picture[-1:]
     data = b"tEXt" + KEYWORD + b"\0" + inputs.encode()
     chunk = struct.pack(">I", len(data) - 4) + data + struct.pack(">I", zlib.crc32(data))
     header = len(SIGNATURE) + 12 + 13
@@ -179,7 +189,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def check(known: list[Group], folder: Path) -> int:
     """Print the pictures that are out of date, missing, or made by nothing; return 1 where there are any."""
-    there = {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*.png")}
+    there = {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*.[pg][ni][gf]")}
     said = []
     for group in known:
         inputs = group.inputs()

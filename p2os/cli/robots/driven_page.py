@@ -75,6 +75,13 @@ class PageDriver:
         self._commands.put(command)
         return True
 
+    def offered(self, _begun: str) -> tuple[str, ...]:
+        """Return names of variables: nobody sees into the program of a robot that is there."""
+        return ()
+
+    def look(self, _panel: str, _choice: str) -> None:
+        """Return what a panel shows: nothing, since nobody sees into it."""
+
     # As the loop.
 
     def drive(self, client: PageDrivenClient) -> None:

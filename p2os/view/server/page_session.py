@@ -16,7 +16,7 @@ from dataclasses import asdict, fields, replace
 from typing import cast
 
 from p2os.view.frames import FrameFlags
-from p2os.view.header import Answered, PageHeader, Wanted
+from p2os.view.header import Answered, PageHeader, PanelState, Wanted
 from p2os.view.live import ShownSource
 from p2os.view.recording import ViewRecording
 from p2os.view.run_control import MOST_LETTERS, CommandError, RunCommand, RunState, command_of
@@ -25,6 +25,8 @@ from simbase.timing import Nanos
 #: chosen: a page's request has less than a kilobyte.
 LARGEST_REQUEST_BYTES = 65_536
 MOST_CHANNELS, MOST_PIXELS = 4096, 8192
+#: chosen: more panels than a screen has room for.
+MOST_PANELS = 6
 #: The end of rows that go on, as the page has it; and as many pixels as a channel is sent for that was made anew.
 OPEN_END_NS, REPLACED_PIXELS = 2**62, 2000
 #: chosen: new rows of a channel that are sent at once.
@@ -63,6 +65,8 @@ class PageSession:
         self._lost = 0
         #: Whether it drives the robot, as far as it has said.
         self._is_driving = False
+        #: The panels that are looked at, each with what of it, and what it showed last.
+        self._looks: dict[tuple[str, str], PanelState | None] = {}
         self._room, self._asked_at = float(MOST_AT_ONCE), 0.0
 
     @property
@@ -91,6 +95,11 @@ class PageSession:
         if lost:
             self._lost += lost
             yield _said(lost=self._lost)
+        for look, last in self._looks.items():
+            panel = None if control is None else control.look(*look)
+            if panel is not last and panel is not None:
+                self._looks[look] = panel
+                yield _said(panel=panel)
         if state is not self._state:
             is_first, self._state = self._state is None, state
             yield _said(run=state, may_control=self._may_control if is_first else None)
@@ -123,6 +132,9 @@ class PageSession:
         """
         self._count(now_s)
         found = _json_of(text)
+        if "looks" in found:
+            self._look(found)
+            return
         if "offer" in found:
             yield self._offered(found)
             return
@@ -159,6 +171,13 @@ class PageSession:
         elif command.do == "drive":
             self._is_driving = bool(command.forward_mps or command.turn_dps)
 
+    def _look(self, found: Mapping[str, object]) -> None:
+        """Take which panels are looked at from now on, each with what of it."""
+        looks = found["looks"]
+        if len(found) != 1 or not isinstance(looks, list) or len(looks) > MOST_PANELS or not all(map(_is_look, looks)):
+            raise RequestError(f"looks are at most {MOST_PANELS} pairs of a panel's name and a choice, and alone")
+        self._looks = dict.fromkeys([(str(panel), str(choice)) for panel, choice in looks])
+
     def _offered(self, found: Mapping[str, object]) -> str:
         """Answer what a name of a variable may be that begins so."""
         begun = found["offer"]
@@ -184,14 +203,23 @@ def _said(
     run: RunState | None = None,
     may_control: bool | None = None,
     offered: Sequence[str] | None = None,
+    panel: PanelState | None = None,
 ) -> str:
     """Return an answer as JSON, without what it does not say."""
     answer = asdict(Answered(
         header=header, done=done, lost=lost, now_ns=now_ns, refused=refused, run=run, may_control=may_control,
-        offered=offered,
+        offered=offered, panel=panel,
     ))  # fmt: skip
     said = {key: value for key, value in answer.items() if value is not None}
     return json.dumps(said, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+
+
+def _is_look(found: object) -> bool:
+    return (
+        isinstance(found, list)
+        and len(found) == 2
+        and all(isinstance(one, str) and len(one) <= MOST_LETTERS for one in found)
+    )
 
 
 _KEYS = frozenset(field.name for field in fields(Wanted))

@@ -21,10 +21,11 @@ from bluepill_sim.program.image import load_image
 from bluepill_sim.program.variables import read_variables
 from p2os.cli.robots.drive_deadman import DriveDeadman
 from p2os.transport.wall_clock import Clock, wall_clock
-from p2os.view.header import PageHeader
+from p2os.view.header import PageHeader, PanelHeader, PanelState
 from p2os.view.live import LiveRecording
 from p2os.view.recording import ViewRecording
 from p2os.view.run_control import MOST_DPS, MOST_MPS, RunCommand, RunState
+from p2os.view.targets import ViewPanel, panels_of
 from robot_bench.bench import Bench, run_of
 from robot_bench.cli.debugging.future import Future, SeenStretch
 from robot_bench.cli.debugging.session import MAIN, RunSession
@@ -45,15 +46,18 @@ from simbase.timing import Nanos
 
 #: chosen: commands that may wait; a person gives some a second.
 MOST_COMMANDS = 64
+#: chosen: panels that are looked at ten times a second, of all pages together.
+MOST_LOOKS, LOOK_NS = 12, 100_000_000
 #: chosen: how long a signal may wait to be looked at where a run stands still, seconds.
 _WAIT_S = 0.2
 
 
 @dataclass(frozen=True, slots=True)
 class BenchBuilt:
-    """What is run, on what, in what: the first entry of the trace."""
+    """What is run, on what, in what: the first entry of the trace; and the panels of its chip."""
 
     meta: Json
+    panels: Sequence[PanelHeader]
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,6 +133,11 @@ class LiveRun:
         self._blocks: dict[str, Blocks] = {}
         self._speed, self._on_wait, self._clock = speed, on_wait, clock
         self._variables, self._firmware = variables, scenario.firmware
+        self._panels: dict[str, ViewPanel] = {}
+        #: What pages look at, by panel and choice, and what each showed last.
+        self._looked: dict[tuple[str, str], PanelState | None] = {}
+        self._wanted: set[tuple[str, str]] = set()
+        self._looked_at: Nanos = 0
         self._commands: queue.SimpleQueue[RunCommand] = queue.SimpleQueue()
         #: How the run stands; None before it has begun.
         self._state = RunState(is_running=True, speed=speed)
@@ -165,16 +174,26 @@ class LiveRun:
         except BluePillError:
             return ()
 
+    def look(self, panel: str, choice: str) -> PanelState | None:
+        """Return what a panel showed last; while it is asked for, it is looked at ten times a second."""
+        key = panel, choice
+        if panel not in self._panels or len(self._wanted) >= MOST_LOOKS:
+            return None
+        self._wanted.add(key)
+        return self._looked.get(key)
+
     # As what runs the bench.
 
     def drive(self, bench: Bench) -> None:
         """Run a bench to its end, as `run_scenario` takes it."""
         meta = meta_of(bench.scenario, bench.parts.world, run_of(bench).note, is_at_port=False)
-        self.source.offer(BenchBuilt(meta), bench.now, is_kept=True)
+        panels = panels_of(bench.chip)
+        self.source.offer(BenchBuilt(meta, [one.header for one in panels]), bench.now, is_kept=True)
         self._run_folder = None if bench.trace.path is None else bench.trace.path.parent
         self._folder = TemporaryDirectory(prefix="p2os-view-")
         session = self._session = RunSession(bench, self, Path(self._folder.name), self._speed)
         session.watch(self._variables)
+        self._panels = {one.name: one for one in panels}
         try:
             while not session.is_over or session.is_running:
                 self._turn(session)
@@ -208,6 +227,7 @@ class LiveRun:
                 self._do(session, RunCommand(do="stop"))
         wait_s = session.go_on(now) if session.is_running else _WAIT_S
         self._hand_over_variables(session)
+        self._look_at_panels(session)
         self._show(session.state())
         if wait_s:
             self._on_wait()
@@ -232,6 +252,25 @@ class LiveRun:
             self._write(HANDS_NAME, scenario_text(self._scenario, self._written, self._run_folder))
         self._hand_over_variables(session)
         self._show(session.state())
+
+    def _look_at_panels(self, session: RunSession) -> None:
+        """Look at the panels that somebody looks at: at most ten times a second of the clock."""
+        clock_ns, at_ns = self._clock(), session.chosen.now_ns
+        if not self._wanted or clock_ns - self._looked_at < LOOK_NS:
+            return
+        if session.chosen.bench is not self._shown_bench:
+            self._shown_bench = session.chosen.bench
+            self._panels = {one.name: one for one in panels_of(self._shown_bench.chip)}
+            self._looked.clear()
+        wanted, self._wanted, self._looked_at = self._wanted, set(), clock_ns
+        for panel, choice in wanted:
+            sections = self._panels[panel].look(choice)
+            found = PanelState(name=panel, choice=choice, at_ns=at_ns, sections=sections)
+            if found != self._looked.get((panel, choice)):
+                self._looked[panel, choice] = found
+
+    #: Whose chip the panels show.
+    _shown_bench: Bench | None = None
 
     def _hand_over_variables(self, session: RunSession) -> None:
         for future, types in session.watched():
@@ -302,7 +341,8 @@ class LiveRun:
 
     def _add(self, happened: Happened) -> None:
         if isinstance(happened, BenchBuilt):
-            self._recording.header = replace(self._recording.header, lead=lead_of(happened.meta))
+            header = replace(self._recording.header, lead=lead_of(happened.meta), panels=happened.panels)
+            self._recording.header = header
             self._tracks[MAIN], self._blocks[MAIN] = RunTracks(self._recording, happened.meta), Blocks()
         elif isinstance(happened, FutureForked):
             self._tracks[happened.future] = self._tracks[happened.parent].forked(happened.future, happened.until_ns)

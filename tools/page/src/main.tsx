@@ -9,13 +9,13 @@ import { Connection } from "./data/socket";
 import type { Store } from "./data/store";
 import { token } from "./data/token";
 import { App } from "./shell/app";
-import { drawTimes } from "./shell/surface";
+import { drawTimes, svgOf } from "./shell/surface";
 import { frameTimes, ReportPage, RunPage, Waiting, waiting } from "./shell/page";
 
 declare global {
   interface Window {
-    /** For tests and measurements: the page's state. */
-    p2osPage?: { app: App; frameTimes: readonly number[]; drawTimes: readonly number[] };
+    /** For tests, measurements and pictures: the page's state. */
+    p2osPage?: { app: App; frameTimes: readonly number[]; drawTimes: readonly number[]; svgOf: typeof svgOf };
   }
 }
 
@@ -23,7 +23,7 @@ const place = document.getElementById("app")!;
 
 function show(store: Store): void {
   const app = new App(store);
-  window.p2osPage = { app, frameTimes, drawTimes };
+  window.p2osPage = { app, frameTimes, drawTimes, svgOf };
   document.title = store.header.value.title || document.title;
   render(<RunPage app={app} />, place);
 }

@@ -22,8 +22,9 @@ describe("a layout", () => {
 
   it("leaves out what a run has not, and gives its room to the others", () => {
     const layout: Layout = { id: "x", title: "x", columns: [{ share: 0.5, groups: [{ share: 0.5, views: ["plan"] }, { share: 0.5, views: ["logic", "plots"] }] }, { share: 0.5, groups: [{ share: 1, views: ["goals"] }] }] };
-    expect(pruned(layout, (view) => view === "plots")).toEqual([{ share: 1, groups: [{ share: 1, views: ["plots"] }] }]);
-    expect(pruned(layout, () => false)).toEqual([]);
+    expect(pruned(layout, ["plots"])).toEqual([{ share: 1, groups: [{ share: 1, views: ["plots"] }] }]);
+    expect(pruned(layout, [])).toEqual([]);
+    expect(pruned(layout, ["plots", "panel-chip", "goals"])[1]!.groups).toEqual([{ share: 1, views: ["goals", "panel-chip"] }]);
   });
 });
 

@@ -17,9 +17,8 @@ from xml.etree import ElementTree as ET
 
 from bluepill_sim.analysis.columns import in_columns
 from bluepill_sim.analysis.coverage import Coverage
-from bluepill_sim.analysis.coverage_page import source_lines
 from bluepill_sim.program.alterations import OPERATORS
-from bluepill_sim.program.line_table import LineTable
+from bluepill_sim.program.line_table import LineTable, source_lines
 from bluepill_sim.program.mutants import Mutant
 from robot_bench.campaign.variants.mutation.interval import CONFIDENCE, share_interval
 from robot_bench.campaign.variants.mutation.trial import Fate, MutantResult

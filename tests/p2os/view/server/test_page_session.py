@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from p2os.view.frames import FrameFlags, ViewFrame
-from p2os.view.header import ChannelHeader, PageHeader
+from p2os.view.header import ChannelHeader, PageHeader, PanelState
 from p2os.view.live import LiveRecording, StillRecording
 from p2os.view.recording import ViewRecording
 from p2os.view.run_control import COMMANDS, RunCommand, RunState
@@ -189,6 +189,10 @@ class Run:
 
     def __init__(self, room: int = 99) -> None:
         self.state, self.taken, self._room = RunState(), list[RunCommand](), room
+        self.panels = dict[tuple[str, str], PanelState]()
+
+    def look(self, panel: str, choice: str) -> PanelState | None:
+        return self.panels.get((panel, choice))
 
     def offer(self, command: RunCommand) -> bool:
         if len(self.taken) >= self._room:
@@ -319,3 +323,32 @@ def test_a_channel_whose_rows_were_made_anew_is_sent_whole_and_then_goes_on() ->
     (frame,), _ = sent_of(session.news())
     assert (frame.flags & FrameFlags.REPLACES, frame.count, frame.to_ns) == (FrameFlags.REPLACES, 4, 2**62)
     assert sent_of(session.news())[0] == []
+
+
+def test_a_panel_that_is_looked_at_is_sent_when_it_shows_something_else() -> None:
+    run = Run()
+    session = controlled(run, may_control=False)
+    list(session.news())
+    assert list(session.receive('{"looks": [["chip", "USART1"], ["board", ""]]}', 0.0)) == []
+    assert sent_of(session.news())[1] == []
+    run.panels["chip", "USART1"] = PanelState(name="chip", choice="USART1", at_ns=5)
+    assert sent_of(session.news())[1] == [{"panel": {"name": "chip", "choice": "USART1", "at_ns": 5, "sections": []}}]
+    assert sent_of(session.news())[1] == []
+    list(session.receive('{"looks": []}', 0.0))
+    run.panels["chip", "USART1"] = PanelState(name="chip", choice="USART1", at_ns=6)
+    assert sent_of(session.news())[1] == []
+
+
+@given(
+    st.recursive(
+        st.none() | st.integers() | st.text(max_size=3), lambda inner: st.lists(inner, max_size=8), max_leaves=12
+    )
+)
+def test_anything_at_all_is_looked_at_or_refused(looks: object) -> None:
+    session = controlled(Run())
+    with contextlib.suppress(RequestError):
+        list(session.receive(json.dumps({"looks": looks}), 0.0))
+        list(session.news())
+    for more in ({"looks": [], "id": 1}, {"looks": [["x", "y"]] * 7}, {"looks": [["x", "y" * 401]]}):
+        with pytest.raises(RequestError, match="looks are"):
+            list(session.receive(json.dumps(more), 0.0))

@@ -1,7 +1,7 @@
 // Data that a server sends: text messages are JSON, binary ones frames. The server is the program that showed this page.
 import type { Answered, PageHeader } from "../generated/view";
 import { frameAt } from "./frames";
-import { type Command, type Request, type Source, Store } from "./store";
+import { type Command, type Look, type Request, type Source, Store } from "./store";
 
 const SUBPROTOCOL = "p2os.view.1";
 /** The server closes so where another try is of no use: a request that is none, a wrong token. */
@@ -44,6 +44,10 @@ export class Connection implements Source {
     if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify({ offer: begun }));
   }
 
+  look(looks: readonly Look[]): void {
+    if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify({ looks }));
+  }
+
   private connect(): void {
     const socket = new WebSocket(this.url, [SUBPROTOCOL, `token.${this.token}`]);
     socket.binaryType = "arraybuffer";
@@ -64,6 +68,7 @@ export class Connection implements Source {
     if (typeof message.may_control === "boolean") this.store.mayControl.value = message.may_control;
     if (message.run) this.store.run.value = message.run;
     if (message.offered) this.store.offered.value = message.offered;
+    if (message.panel) this.store.showPanel(message.panel);
     if (message.lost) this.store.forget();
     if (message.refused) this.store.trouble.value = `refused: ${message.refused}`;
   }
@@ -78,6 +83,7 @@ export class Connection implements Source {
     this.store.all.value = header;
     if (!isAgain) return;
     this.store.trouble.value = "";
+    this.store.lookAgain();
     this.store.forget(); // another run may be there now
   }
 

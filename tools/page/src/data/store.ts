@@ -1,6 +1,6 @@
 // All that the page knows of a run: its header, and of each channel what was sent so far. Views read from here and say what they need.
 import { computed, type ReadonlySignal, signal, type Signal } from "@preact/signals";
-import type { ChannelHeader, PageHeader, RunCommand, RunState, Wanted } from "../generated/view";
+import type { ChannelHeader, PageHeader, PanelState, RunCommand, RunState, Wanted } from "../generated/view";
 import type { Frame } from "./frames";
 import { Lane, OPEN_END_NS, serves } from "./lane";
 
@@ -14,6 +14,8 @@ export interface Source {
   command?(command: Command): void;
   /** Asks which names of variables begin so: they come as `Store.offered`. */
   offer?(begun: string): void;
+  /** Says which panels are looked at, each with what of it: what they show comes as `Store.panels`. */
+  look?(looks: readonly Look[]): void;
 }
 
 /** Which futures are looked at: the sources of their channels, and until when they are known. */
@@ -21,6 +23,9 @@ export interface Shown {
   readonly sources: readonly string[];
   readonly end_ns: number;
 }
+
+/** A panel's name, and what of it is looked at. */
+export type Look = readonly [string, string];
 
 export type Command = Pick<RunCommand, "do"> & Partial<RunCommand>;
 
@@ -45,6 +50,9 @@ export class Store {
   readonly version = signal(0);
   /** Names of variables, for what was typed last. */
   readonly offered: Signal<readonly string[]> = signal([]);
+  /** What panels show, by name and choice. */
+  readonly panels: Signal<ReadonlyMap<string, PanelState>> = signal(new Map());
+  private looks: readonly Look[] = [];
   /** What is wrong with the connection, in a line; empty: nothing. */
   readonly trouble = signal("");
   private readonly lanes = new Map<number, Lane>();
@@ -64,6 +72,26 @@ export class Store {
 
   offer(begun: string): void {
     this.source?.offer?.(begun);
+  }
+
+  /** Looks at a panel until what is returned is called. */
+  look(look: Look): () => void {
+    this.looks = [...this.looks, look];
+    this.lookAgain();
+    return () => {
+      this.looks = this.looks.filter((one) => one !== look);
+      this.lookAgain();
+    };
+  }
+
+  /** Says what is looked at: to a server that has just been connected to, too. */
+  lookAgain(): void {
+    this.source?.look?.(this.looks);
+  }
+
+  /** Takes what a panel shows. */
+  showPanel(panel: PanelState): void {
+    this.panels.value = new Map(this.panels.peek()).set(`${panel.name} ${panel.choice}`, panel);
   }
 
   channels(kind: string): readonly ChannelHeader[] {

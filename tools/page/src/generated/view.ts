@@ -203,6 +203,7 @@ export interface Answered {
   readonly run: RunState | null;
   readonly may_control: boolean | null;
   readonly offered: readonly string[] | null;
+  readonly panel: PanelState | null;
 }
 
 /** A channel: what its rows are of. */
@@ -264,6 +265,16 @@ export interface PageCurve {
   readonly hrefs: readonly string[];
 }
 
+/** A drawing of shapes. */
+export interface PageDrawing {
+  readonly kind: "drawing";
+  readonly title: string;
+  readonly alt: string;
+  readonly width: number;
+  readonly height: number;
+  readonly shapes: readonly PictureShape[];
+}
+
 /** What a page begins with. */
 export interface PageHeader {
   readonly format: number;
@@ -280,6 +291,7 @@ export interface PageHeader {
   readonly robots: readonly RobotHeader[];
   readonly hands: HandsOffer | null;
   readonly sections: readonly PageSection[];
+  readonly panels: readonly PanelHeader[];
   readonly left_out: readonly string[];
   readonly footer: string;
 }
@@ -328,7 +340,7 @@ export interface PagePlot {
 export interface PageSection {
   readonly title: string;
   readonly note: string;
-  readonly blocks: readonly (PageTable | PageText | PagePicture | PagePlot | PageList | PagePlan)[];
+  readonly blocks: readonly (PageTable | PageText | PagePicture | PagePlot | PageList | PagePlan | PageDrawing)[];
   readonly is_folded: boolean;
 }
 
@@ -346,6 +358,34 @@ export interface PageText {
   readonly title: string;
   readonly text: string;
   readonly is_listing: boolean;
+}
+
+/** A panel: a view of what runs, as it is now. */
+export interface PanelHeader {
+  readonly name: string;
+  readonly title: string;
+  readonly choices: readonly string[];
+}
+
+/** What a panel shows. */
+export interface PanelState {
+  readonly name: string;
+  readonly choice: string;
+  readonly at_ns: number;
+  readonly sections: readonly PageSection[];
+}
+
+/** A shape of a drawing; lengths in those of the drawing, y down. */
+export interface PictureShape {
+  readonly kind: "box" | "circle" | "text";
+  readonly x: number;
+  readonly y: number;
+  readonly width: number;
+  readonly height: number;
+  readonly text: string;
+  readonly align: "start" | "middle" | "end";
+  readonly role: string;
+  readonly title: string;
 }
 
 /** A robot: its outline around the point that its pose says. */
@@ -454,7 +494,7 @@ export interface PartingState {
 
 /** What a page asks of a run. */
 export interface RunCommand {
-  readonly do: "run" | "pause" | "go" | "step" | "back" | "speed" | "fork" | "choose" | "drop" | "compare" | "halt_at" | "halt_not_at" | "watch" | "watch_not" | "hand" | "drive" | "save";
+  readonly do: "run" | "pause" | "go" | "step" | "back" | "speed" | "fork" | "choose" | "drop" | "compare" | "halt_at" | "halt_not_at" | "watch" | "watch_not" | "hand" | "drive" | "stop" | "save";
   readonly at_ns: number | null;
   readonly unit: "instruction" | "line" | "edge" | "packet" | "event" | "millisecond";
   readonly speed: number;
@@ -484,6 +524,6 @@ export interface RunState {
 }
 
 export type Standing = "" | "passed" | "failed" | "open";
-export type PageBlock = PageTable | PageText | PagePicture | PagePlot | PageList | PagePlan;
-export type Doing = "run" | "pause" | "go" | "step" | "back" | "speed" | "fork" | "choose" | "drop" | "compare" | "halt_at" | "halt_not_at" | "watch" | "watch_not" | "hand" | "drive" | "save";
+export type PageBlock = PageTable | PageText | PagePicture | PagePlot | PageList | PagePlan | PageDrawing;
+export type Doing = "run" | "pause" | "go" | "step" | "back" | "speed" | "fork" | "choose" | "drop" | "compare" | "halt_at" | "halt_not_at" | "watch" | "watch_not" | "hand" | "drive" | "stop" | "save";
 export type StepUnit = "instruction" | "line" | "edge" | "packet" | "event" | "millisecond";

@@ -1,6 +1,6 @@
 // The views beside one another, moved and sized by who looks, on a wide page.
 import { createDockview, type IContentRenderer } from "dockview";
-import { VIEWS } from "../views/all";
+import { viewsOf } from "../views/all";
 import type { App } from "./app";
 import { type Layout, pruned } from "./layouts";
 
@@ -13,7 +13,7 @@ export interface Dock {
 }
 
 export function mountDock(app: App, host: HTMLElement, layout: Layout): Dock {
-  const kinds = new Map(VIEWS.filter((view) => view.has(app.store)).map((view) => [view.id, view])), columns = pruned(layout, (view) => kinds.has(view));
+  const kinds = new Map(viewsOf(app.store).map((view) => [view.id, view])), columns = pruned(layout, [...kinds.keys()]);
   const begins: (() => void)[] = [];
   let isLaid = false; // while panels are put in, each is in front for a moment
   const api = createDockview(host, {

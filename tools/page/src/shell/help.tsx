@@ -1,6 +1,6 @@
 // The list of keys and views.
 import { useEffect, useRef } from "preact/hooks";
-import { VIEWS } from "../views/all";
+import { viewsOf } from "../views/all";
 import type { App } from "./app";
 import { IconButton } from "./icons";
 import { KEYS } from "./keys";
@@ -13,7 +13,7 @@ const POINTER = [
 export function Help({ app, onClose }: { app: App; onClose: () => void }) {
   const dialog = useRef<HTMLDialogElement>(null);
   useEffect(() => dialog.current?.showModal(), []);
-  const views = VIEWS.filter((view) => view.has(app.store));
+  const views = viewsOf(app.store);
   return (
     <dialog ref={dialog} class="help" aria-labelledby="help-title" onClose={onClose}>
       <div class="help-head"><h2 id="help-title">Keys and views</h2><IconButton icon="close" label="Close" onClick={() => dialog.current?.close()} /></div>

@@ -42,9 +42,15 @@ export const LAYOUTS: readonly Layout[] = [
   },
 ];
 
-/** The columns without the views that a run has not; groups and columns that are empty then are none, the others share their room. */
-export function pruned(layout: Layout, has: (view: string) => boolean): readonly Column[] {
-  const columns = layout.columns.map((column) => ({ ...column, groups: shared(column.groups.map((group) => ({ ...group, views: group.views.filter(has) })).filter((group) => group.views.length)) }));
+/**
+ * The columns with the views that a run has; groups and columns that are empty then are none, the others share their room.
+ *
+ * Views that no layout names, those of panels, stand in its last column's first place, behind what is there.
+ */
+export function pruned(layout: Layout, views: readonly string[]): readonly Column[] {
+  const named = layout.columns.flatMap((column) => column.groups.flatMap((group) => group.views)), others = views.filter((view) => !named.includes(view)), last = layout.columns.at(-1)?.groups[0];
+  const there = (group: Group) => [...group.views.filter((view) => views.includes(view)), ...(group === last ? others : [])];
+  const columns = layout.columns.map((column) => ({ ...column, groups: shared(column.groups.map((group) => ({ ...group, views: there(group) })).filter((group) => group.views.length)) }));
   return shared(columns.filter((column) => column.groups.length));
 }
 

@@ -2,7 +2,7 @@
 import { effect, signal } from "@preact/signals";
 import { useEffect, useRef, useState } from "preact/hooks";
 import type { PageHeader } from "../generated/view";
-import { VIEWS } from "../views/all";
+import { viewsOf } from "../views/all";
 import { Sections } from "../views/report/blocks";
 import type { App } from "./app";
 import { type Dock, mountDock } from "./dock";
@@ -31,7 +31,7 @@ export function ReportPage({ header }: { header: PageHeader }) {
 export function RunPage({ app }: { app: App }) {
   const [start] = useState(() => parsedPlace(location.hash)), header = app.store.header.value;
   const [layout, setLayout] = useState(LAYOUTS.some((one) => one.id === start.layout) ? start.layout! : LAYOUTS[0]!.id), [isWide, setWide] = useState(matchMedia(WIDE).matches);
-  const views = VIEWS.filter((view) => view.has(app.store)), [view, setView] = useState(start.view && views.some((one) => one.id === start.view) ? start.view : (views[0]?.id ?? ""));
+  const views = viewsOf(app.store), [view, setView] = useState(start.view && views.some((one) => one.id === start.view) ? start.view : (views[0]?.id ?? ""));
   const place = useRef<HTMLElement>(null), dock = useRef<Dock>(undefined);
   useEffect(() => goTo(app, start), []);
   useEffect(() => {

@@ -1,5 +1,6 @@
 // A canvas that fills its place, is sharp on any screen, and is drawn at most once a frame.
 import { effect } from "@preact/signals";
+import { SvgSheet } from "./svg";
 import { theme } from "./theme";
 import { reads } from "../time/reads";
 
@@ -23,6 +24,18 @@ export const MONO_FONT = "11px ui-monospace, 'SF Mono', Menlo, Consolas, monospa
 /** How long drawing took, of the last frames: what `frameTimes()` of the page reports. */
 export const drawTimes: number[] = [];
 
+const drawings = new WeakMap<HTMLCanvasElement, (sheet: Sheet) => void>();
+
+/** What a surface shows, as SVG; undefined of a canvas that is none. */
+export function svgOf(canvas: HTMLCanvasElement): string | undefined {
+  const draw = drawings.get(canvas), { clientWidth: width, clientHeight: height } = canvas, measure = document.createElement("canvas").getContext("2d");
+  if (!draw || !measure || !width) return undefined;
+  const sheet = new SvgSheet(width, height, theme.peek().panel, measure);
+  sheet.font = FONT;
+  draw({ g: sheet as unknown as CanvasRenderingContext2D, width, height });
+  return sheet.text();
+}
+
 /**
  * @param watch Reads every signal that the drawing depends on.
  * @param draw Draws everything, on a cleared sheet.
@@ -34,6 +47,7 @@ export function surface(host: HTMLElement, label: string, watch: () => void, dra
   canvas.setAttribute("role", "img");
   canvas.setAttribute("aria-label", label);
   host.append(canvas);
+  drawings.set(canvas, draw);
   let asked = 0, isGone = false;
   const paint = () => {
     asked = 0;

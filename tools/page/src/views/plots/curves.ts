@@ -26,7 +26,7 @@ export interface Chart {
 /** What of a pose is drawn over time. */
 const POSE = [["position", "m", [["x", "x_m", 1], ["y", "y_m", 1]]], ["heading", "°", [["heading", "heading_rad", 180 / Math.PI]]]] as const;
 
-/** One chart for each group and unit, in the header's order; of poses those of position and heading at the end. */
+/** One chart for each group and unit, in the header's order, variables of the program first; of poses those of position and heading at the end. */
 export function chartsOf(store: Store): Chart[] {
   const charts = new Map<string, { title: string; unit: string; curves: Curve[] }>();
   const put = (title: string, unit: string, curve: Curve) => {
@@ -41,7 +41,8 @@ export function chartsOf(store: Store): Chart[] {
   }
   for (const [title, unit, parts] of POSE) for (const channel of store.channels("pose")) for (const [name, column, factor] of parts)
     put(title, unit, { key: `${channel.id} ${column}`, name: [channel.source, name].filter(Boolean).join(" "), channel, column, factor, isStepped: false, mark: null });
-  return [...charts.values()].flatMap(apart);
+  const watched = (chart: Chart) => Number(chart.unit !== "" || !chart.curves.every((curve) => curve.channel.kind === "samples"));
+  return [...charts.values()].sort((a, b) => watched(a) - watched(b)).flatMap(apart);
 }
 
 /** Curves that are told apart in one chart. */

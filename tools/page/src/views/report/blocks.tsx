@@ -1,6 +1,6 @@
 // The parts of a report: tables, lists, listings, pictures and plots, as the header's sections have them.
 import { useEffect, useRef } from "preact/hooks";
-import type { PageBlock, PageCell, PageList, PagePicture, PageSection, PageTable, PageText, Standing } from "../../generated/view";
+import type { PageBlock, PageCell, PageDrawing, PageList, PagePicture, PageSection, PageTable, PageText, Standing } from "../../generated/view";
 import { Icon, type IconName } from "../../shell/icons";
 import { mountPlan } from "./figure_plan";
 import { mountPlot } from "./figure_plot";
@@ -28,6 +28,7 @@ function Block({ block, seek }: { block: PageBlock; seek: Seek }) {
     case "list": return <List block={block} seek={seek} />;
     case "text": return <Text block={block} />;
     case "picture": return <Picture block={block} />;
+    case "drawing": return <Drawing block={block} />;
     case "plot": return <Mounted mount={(host) => mountPlot(host, block)} />;
     case "plan": return <Mounted mount={(host) => mountPlan(host, block)} />;
   }
@@ -66,6 +67,21 @@ function Text({ block }: { block: PageText }) {
 
 function Picture({ block }: { block: PagePicture }) {
   return <figure>{/^[A-Za-z0-9+/=\s]*$/.test(block.png) && <img alt={block.alt} src={`data:image/png;base64,${block.png}`} />}{block.title && <figcaption>{block.title}</figcaption>}</figure>;
+}
+
+function Drawing({ block }: { block: PageDrawing }) {
+  return (
+    <figure class="drawing">
+      <svg viewBox={`0 0 ${block.width} ${block.height}`} role="img" aria-label={`${block.title}: ${block.alt}`}>
+        {block.shapes.map((shape) => {
+          const role = `shape ${shape.role}`, title = shape.title && <title>{shape.title}</title>;
+          if (shape.kind === "box") return <rect class={role} x={shape.x} y={shape.y} width={shape.width} height={shape.height} rx="4">{title}</rect>;
+          if (shape.kind === "circle") return <circle class={role} cx={shape.x} cy={shape.y} r={shape.width}>{title}</circle>;
+          return <text class={role} x={shape.x} y={shape.y} text-anchor={shape.align}>{shape.text}</text>;
+        })}
+      </svg>
+    </figure>
+  );
 }
 
 function Mounted({ mount }: { mount: (host: HTMLElement) => () => void }) {
