@@ -127,7 +127,7 @@ LAYERS = {
     "robot_bench": (
         ("running", "firmware", "origin_gate"), ("wires",), ("events",), ("direct",), ("recording",),
         ("drives", "view"), ("scenario", "report"),
-        ("adapter", "scenarios"), ("bench",), ("remote",), ("run", "project"),
+        ("adapter", "scenarios"), ("bench",), ("remote",), ("run",),
         ("networks", "experiments"), ("campaign",), ("ros", "live"), ("cli",),
     ),
 }  # fmt: skip
@@ -659,7 +659,7 @@ def test_the_speed_of_a_motor_step_is_said_once() -> None:
 def test_what_is_written_of_a_motor_step_for_readers_is_that_speed() -> None:
     written = re.compile(r"([\d.]+) mm/s (?:a (?:motor )?step|\(four steps)|(?:eight steps of|step is) ([\d.]+) mm/s")
     files = [*(ROOT / "docs").glob("*.md"), *(ROOT / "robot_bench").glob("firmware/*.[ch]"),
-             ROOT / "robot_bench" / "project" / "template" / "main.c"]  # fmt: skip
+             ROOT / "robot_bench" / "cli" / "project" / "template" / "main.c"]  # fmt: skip
     said = {(path.name, float(one or other)) for path in files
             for one, other in written.findall(path.read_text(encoding="utf-8"))}  # fmt: skip
     assert len(said) >= 5

@@ -104,7 +104,7 @@ def test_options_files_and_targets_that_pages_name_exist() -> None:
         for folder in ("tools", "hardware", "adapter_fw") for suffix in ("*.py", "*.cpp")
         for path in (ROOT / folder).rglob(suffix)
     )  # fmt: skip
-    makefiles = (ROOT / "Makefile", ROOT / "robot_bench" / "project" / "template" / "Makefile")
+    makefiles = (ROOT / "Makefile", ROOT / "robot_bench" / "cli" / "project" / "template" / "Makefile")
     targets = {name for file in makefiles for name in re.findall(r"(?m)^([a-z-]+):", file.read_text(encoding="utf-8"))}
     ignored = (ROOT / ".gitignore").read_text(encoding="utf-8").split()
     found = []

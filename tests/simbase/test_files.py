@@ -149,7 +149,7 @@ WRITTEN_ELSEWHERE = {
     "robot_bench.campaign.journal": "each line within `writing`",
     "robot_bench.cli.campaigns.campaign": "must not be there; tells of it itself",
     "robot_bench.cli.sweep": "opened only, within `writing`",
-    "robot_bench.project.files": "must not be there; takes back what was written",
+    "robot_bench.cli.project.files": "must not be there; takes back what was written",
     "robot_bench.recording.waveforms": "whole, within its caller's `writing`",
     "bluepill_sim.analysis.waveforms.vcd_writer": "whole, within its caller's `writing`",
     "bluepill_sim.analysis.waveforms.sigrok_writer": "an entry of an archive, within its caller's `writing`",

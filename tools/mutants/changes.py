@@ -20,8 +20,8 @@ PACKAGES = ("simbase", "p2os", "bluepill_sim", "adapter_sim", "robot_bench", "ad
 #: Data that is code in its ending alone, and programs that run on a chip.
 LEFT_OUT = (
     "robot_bench/firmware/",
-    "robot_bench/project/template/",
-    "robot_bench/project/beside/",
+    "robot_bench/cli/project/template/",
+    "robot_bench/cli/project/beside/",
     "bluepill_sim/analysis/silicon/",
 )
 

@@ -15,8 +15,8 @@ from adapter_sim.pinout import load_pinout
 from p2os.cli.main import run as p2os
 from p2os.pioneer.body.factory import BEST, resolve_body
 from robot_bench import Bench
+from robot_bench.cli.project import files as project
 from robot_bench.firmware.build import COMPILER
-from robot_bench.project import files as project
 from robot_bench.scenario.loading import read_scenario
 from tests.tools.forked_python import PYTEST, forked_python
 
@@ -139,7 +139,7 @@ def test_a_disk_that_fills_up_leaves_nothing_behind(written: int, monkeypatch: p
 def test_a_missing_compiler_is_reported_with_its_package(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("robot_bench.cli.new.COMPILER", "no-such-compiler")
+    monkeypatch.setattr("robot_bench.cli.project.new.COMPILER", "no-such-compiler")
     assert p2os(["new", "mine"]) == 0
     assert capsys.readouterr().err == (
         "no-such-compiler is not installed: sudo apt-get install gcc-arm-none-eabi make\n"

@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 from p2os.cli.main import run as p2os
+from robot_bench.cli.project.existing import LAYOUTS, find_project, layout_of, preset_programs
+from robot_bench.cli.project.files import project_files, write_project
 from robot_bench.firmware.build import COMPILER
-from robot_bench.project.existing import LAYOUTS, find_project, layout_of, preset_programs
-from robot_bench.project.files import project_files, write_project
 from robot_bench.scenario.loading import load_scenario
 from tests.tools.forked_python import PYTEST, forked_python
 

@@ -227,7 +227,7 @@ def test_what_needs_goals_or_keys_alone_executes_nothing(words: list[str], folde
 
 
 def test_a_new_project_trusts_itself_in_its_tests() -> None:
-    template = files("robot_bench.project").joinpath("template", "pytest.ini").read_text(encoding="utf-8")
+    template = files("robot_bench.cli.project").joinpath("template", "pytest.ini").read_text(encoding="utf-8")
     assert "\np2os_trust = .\n" in template
 
 

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import pytest
 
+from robot_bench.cli.project import files as project
 from robot_bench.firmware.build import COMPILER
-from robot_bench.project import files as project
 from tests.documentation.command_lines import command_line, faults
 from tests.tools.forked_python import PYTEST, forked_python
 

@@ -10,8 +10,7 @@ import typer
 
 from p2os.cli.groups import BENCH
 from p2os.pioneer.body.factory import BEST, resolve_body
-from robot_bench.firmware.build import COMPILER
-from robot_bench.project.existing import (
+from robot_bench.cli.project.existing import (
     SCENARIO,
     TESTS,
     FoundProject,
@@ -20,10 +19,11 @@ from robot_bench.project.existing import (
     layout_of,
     seen_tests,
 )
-from robot_bench.project.files import BUILDS, ROBOTS, project_files, write_files, write_project
+from robot_bench.cli.project.files import BUILDS, ROBOTS, project_files, write_files, write_project
+from robot_bench.firmware.build import COMPILER
 from simbase.errors import P2osError, UsageError, shown_name
 
-HELP = """Write a project of your own, or put the bench beside one that you have.
+HELP = """Write a project of your own, or a bench beside one that is there.
 
 FOLDER is new or empty. It gets one C file to change, start-up code, linker
 script, register names, what builds it, a scenario, tests, what CI services

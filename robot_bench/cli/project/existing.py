@@ -15,7 +15,7 @@ from pathlib import Path
 from adapter_sim.pinout import WireRole, load_pinout
 from bluepill_sim.program.image import load_image
 from robot_bench.bench import Bench
-from robot_bench.project.files import text_of_package
+from robot_bench.cli.project.files import text_of_package
 from simbase.errors import FileError, UsageError, shown_name
 from simbase.files import read_text
 from simbase.timing import NS_PER_MS, NS_PER_S
@@ -216,9 +216,9 @@ def files_beside(found: FoundProject, body: str) -> dict[str, str]:
         SCENARIO: "bench.toml", TESTS: "test_bench", ".vscode/tasks.json": "tasks.json",
         **found.layout.ties,
     }  # fmt: skip
-    texts = {name: text_of_package("robot_bench.project", f"beside/{source}") for name, source in beside.items()}
+    texts = {name: text_of_package("robot_bench.cli.project", f"beside/{source}") for name, source in beside.items()}
     texts[".vscode/launch.json"] = (
-        text_of_package("robot_bench.project", "template/launch.json")
+        text_of_package("robot_bench.cli.project", "template/launch.json")
         .replace("just-drive.toml", SCENARIO)
         .replace("@ELF@", found.program.as_posix())
     )

@@ -160,7 +160,9 @@ def project_files(body: str, *, build: str = "make", robot: str = "p2dx") -> dic
         "@BUILD@": by.commands, "@PACKAGES@": by.packages, "@PIP@": by.pip,
     }  # fmt: skip
     templates = {**kind.templates, **by.templates, **_TEMPLATES}
-    found = {name: text_of_package("robot_bench.project", f"template/{source}") for name, source in templates.items()}
+    found = {
+        name: text_of_package("robot_bench.cli.project", f"template/{source}") for name, source in templates.items()
+    }
     if by.firmware != FIRMWARE:
         words[FIRMWARE] = by.firmware
     found = {name: _filled(text, words) for name, text in found.items()}

@@ -12,7 +12,7 @@ import pytest
 pytest.importorskip("uvicorn", reason="the extra view is not installed")
 
 from tests.p2os.view.test_page_in_browser import TOOLS, tools
-from tests.robot_bench.cli.test_control_in_browser import p2os
+from tests.robot_bench.cli.shown.test_control_in_browser import p2os
 
 RUN = ["run", "dodge", "--mode", "direct", "--body", "kinematic", "--duration", "4s", "--realtime", "0.1", "--view"]
 
