@@ -167,7 +167,6 @@ class SpeedPlausibility(Stateful):
         """Start anew, with the wheels at rest."""
         self.command = (0, 0)
         self.measured = (0, 0)
-        self._least_error = 0
         self._passed_at = now
 
     def expect(self, left_mm_s: int, right_mm_s: int) -> None:

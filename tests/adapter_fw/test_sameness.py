@@ -14,6 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from adapter_sim import AdapterSettings
+from adapter_sim.adapter import OPEN_STATES
 from adapter_sim.codec import BitOrder
 from adapter_sim.masters import Master
 from adapter_sim.settings import EncoderAtOpen, MotorCommand, MotorMeaning
@@ -164,6 +165,38 @@ def test_samples_that_are_taken_late_see_the_levels_of_their_instants(waits: boo
         side.adapter.advance_to(twins.now + 5 * MS)
         side.adapter.advance_to(twins.now + 1_500 * MS)
     twins.compare()
+
+
+@pytest.mark.parametrize("texts", [b"", b"A", b"Twin", b"Twin\0", b"Twin\0Pioneer", b"Twin\0Pioneer\0p2dx", b"\0\0\0"])
+def test_both_read_the_robots_name_wherever_it_ends_and_want_bare_echoes(texts: bytes) -> None:
+    """What follows a text without its NUL is the frame's checksum, and belongs to nothing."""
+    twins = Twins(AdapterSettings())
+    twins.pass_time(320 * MS)
+    twins.pin("p2dx_con", True)
+    twins.pass_time(20 * MS)
+    twins.frame(b"\0\1")  # an echo of SYNC0 that carries a byte
+    twins.pass_time(100 * MS)
+    assert twins.sides[0].frames[-1][3] == 0, "it asks for SYNC0 again"
+    while twins.sides[0].frames[-1][3] < 2:
+        twins.answer()
+        twins.pass_time(20 * MS)
+    twins.frame(b"\2" + texts)
+    for _ in range(4):
+        twins.pass_time(200 * MS)  # `connected` has the names, of both alike
+        twins.send_sip()
+    assert (twins.firmware.state in OPEN_STATES) is bool(texts), "a bare echo is no name"
+
+
+def test_the_last_frames_that_fit_are_kept_where_nobody_takes_any() -> None:
+    twins = Twins(AdapterSettings())
+    twins.pass_time(320 * MS)
+    twins.pin("p2dx_con", True)
+    firmware = twins.firmware
+    while (due := firmware.next_deadline()) is not None and due < 200_000 * MS:
+        firmware.advance_to(due)
+    assert len(firmware.take_output()) == 64
+    assert firmware.numbers["overflows"] > 0
+    assert firmware.take_output() == []
 
 
 def test_both_try_every_line_speed_in_turn_up_to_the_eighth() -> None:
