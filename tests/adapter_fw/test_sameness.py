@@ -18,6 +18,7 @@ from adapter_sim.adapter import OPEN_STATES
 from adapter_sim.codec import BitOrder
 from adapter_sim.masters import Master
 from adapter_sim.settings import EncoderAtOpen, MotorCommand, MotorMeaning
+from p2os.protocol.profiles import Profile
 from robot_bench.adapter import is_available
 from tests.adapter_fw import mutation
 from tests.adapter_fw.boundaries import Life
@@ -191,11 +192,17 @@ def test_the_last_frames_that_fit_are_kept_where_nobody_takes_any() -> None:
     twins = Twins(AdapterSettings())
     twins.pass_time(320 * MS)
     twins.pin("p2dx_con", True)
-    firmware = twins.firmware
-    while (due := firmware.next_deadline()) is not None and due < 200_000 * MS:
-        firmware.advance_to(due)
+    while twins.firmware.state not in OPEN_STATES:
+        twins.pass_time(20 * MS)
+        twins.answer()
+    firmware, now, sip = twins.firmware, twins.now, twins.sip.to_frame(Profile.P2OS).to_bytes()
+    while not firmware.numbers["overflows"]:
+        now += 10 * MS
+        assert now < 100_000 * MS
+        firmware.receive(sip, now)
+        while (due := firmware.next_deadline()) is not None and due <= now:
+            firmware.advance_to(due)
     assert len(firmware.take_output()) == 64
-    assert firmware.numbers["overflows"] > 0
     assert firmware.take_output() == []
 
 
