@@ -77,7 +77,8 @@ def test_encoders_that_cannot_have_changed_are_not_waited_for_and_change_nothing
         return finished(made).trace.sha256, len(stops)
 
     ahead = run()
-    monkeypatch.setattr(type(bench(scenario("direct", body)).parts.body), "steps_within", lambda *_: 0)
+    engine = bench(scenario("direct", body)).parts.body.step.__self__  # nobody drives by hand
+    monkeypatch.setattr(type(engine), "steps_within", lambda *_: 0)
     each = run()
     assert ahead[0] == each[0]
     assert each[1] == 3 * 200

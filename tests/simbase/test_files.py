@@ -105,6 +105,7 @@ READ_ELSEWHERE = {
     "robot_bench.adapter": "of this installation",
     "robot_bench.campaign.workers.processes": "of the kernel",
     "robot_bench.firmware.build": "of this installation",
+    "robot_bench.cli.project.existing": "its first bytes, to know an ELF by",
     "robot_bench.experiments.drive_files": "one short line, to know a log by",
     "robot_bench.recording.trace": "what this run has written itself",
 }

@@ -179,7 +179,9 @@ def test_the_nearest_tests_are_those_of_the_mirror_then_those_that_ran_the_line(
     by_name = Nearest(ROOT, {})
     assert by_name.of("p2os/client/link.py", 1)[0] == "tests/p2os/client/test_link.py"
     assert by_name.of("adapter_fw/core/app/text.cpp", 1)[0].startswith("tests/adapter_fw/")
-    assert "tests/bluepill_sim/peripherals/tim" in by_name.of("bluepill_sim/extension/source/devices/tim.c", 1)[0]
+    walk, beside = by_name.of("bluepill_sim/extension/source/devices/tim.c", 1)[:2]
+    assert walk == "tests/bluepill_sim/peripherals/walks/test_tim_walks.py"
+    assert beside.startswith("tests/bluepill_sim/peripherals/tim")
     in_order = by_name.of("bluepill_sim/extension/source/interpreter/lower.c", 1)
     assert in_order[0].startswith("tests/bluepill_sim/core/interpreter/")
     ran = {"tests/whole/test_plugins.py": frozenset({7}), "tests/p2os/client/test_link.py": frozenset({8, 9})}

@@ -22,6 +22,7 @@ from robot_bench.cli.project.existing import (
 from robot_bench.cli.project.files import BUILDS, ROBOTS, project_files, write_files, write_project
 from robot_bench.firmware.build import COMPILER
 from simbase.errors import P2osError, UsageError, shown_name
+from simbase.files import read_text, write_text
 
 HELP = """Write a project of your own, or a bench beside one that is there.
 
@@ -109,8 +110,7 @@ def _beside(folder: Path, build: str) -> None:
     there = [name for name in contents if (folder / name).exists()]
     new_ones = {name: text for name, text in contents.items() if name not in there}
     write_files(folder, new_ones)
-    with (folder / TESTS).open("a", encoding="utf-8") as stream:
-        stream.write(seen_tests(folder / SCENARIO))
+    write_text(folder / TESTS, read_text(folder / TESTS) + seen_tests(folder / SCENARIO))
     _tell(found, list(new_ones), there)
 
 
