@@ -52,7 +52,7 @@ async function drag(from, to) {
 }
 found.dragged = await after(page, () => drag([1.6, -1.3], [1.0, 0]));
 await page.getByRole("combobox", { name: "What dragging in the plan does" }).selectOption("wall");
-found.drawn = await after(page, () => drag([-2, -0.5], [-1, -0.5]));
+found.drawn = await after(page, () => drag([0.5, -2.4], [1.5, -2.4]));
 await after(page, () => page.getByRole("combobox", { name: "Speed of the run" }).selectOption("fastest"));
 found.over = await after(page, () => press(page, "Let the run go on from here"));
 found.saved = (await after(page, () => press(page, "Save as test"))).saved;

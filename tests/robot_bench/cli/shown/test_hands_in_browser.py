@@ -17,10 +17,15 @@ pytest.importorskip("uvicorn", reason="the extra view is not installed")
 from tests.p2os.view.test_page_in_browser import TOOLS, tools
 
 #: Dodge drives straight ahead from 3.5 s on, and is at x = 0.7 m by 7 s.
+#: Long enough before it comes to what is dragged into its way that a browser is there in time.
 WAY = """\
 extends = "dodge"
 body = "kinematic"
-duration_s = 9.0
+duration_s = 15.0
+
+[start]
+x_m = -1.2
+y_m = 0.0
 
 [[goal]]
 kind = "reach"
