@@ -120,7 +120,9 @@ def _start(folder: Path, preloaded: str) -> None:
     ))  # fmt: skip
     listener.close()
     os.close(read_end)
-    program.write_text(f'#!/bin/sh\nexec "{sys.executable}" -I -S "{CLIENT}" "{folder / "socket"}" "$@"\n')
+    program.write_text(
+        f'#!/bin/sh\nexec "{sys.executable}" -I -S "{CLIENT}" "{folder / "socket"}" "{preloaded}" "$@"\n'
+    )
     program.chmod(0o755)
 
 

@@ -78,14 +78,15 @@ class Signals:
             pass
 
 
-def main(address: str, words: list[str]) -> int:
-    """Have a process forked, or start it; return its exit code."""
+def main(address: str, preloaded: str, words: list[str]) -> int:
+    """Have a process forked, or start it, with the library that is to be preloaded; return its exit code."""
     signals = Signals()
     line = _socket.socket(_socket.AF_UNIX, _socket.SOCK_STREAM)
     process = handed_over(line, address, words, signals.ignored)
     signals.pass_to(process)
     if not process:
-        posix.execv(sys.executable, [sys.executable, *words])
+        more = {b"LD_PRELOAD": preloaded.encode()} if preloaded else {}
+        posix.execve(sys.executable, [sys.executable, *words], {**posix.environ, **more})
     code = received(line)
     if code is None:
         return 70
@@ -101,4 +102,4 @@ def die_of(number: int) -> None:
     posix.kill(posix.getpid(), number)
 
 
-posix._exit(main(sys.argv[1], sys.argv[2:]))
+posix._exit(main(*sys.argv[1:3], sys.argv[3:]))

@@ -13,6 +13,7 @@ import pytest
 
 from tests.p2os.client.served_robot import until
 from tests.tools.forked_python import ROOT, forked_python
+from tests.whole.failing_calls import library
 
 TIMEOUT_S = 30.0
 PASSED_ON = ("SIGHUP", "SIGINT", "SIGQUIT", "SIGUSR1", "SIGUSR2", "SIGTERM", "SIGTSTP", "SIGCONT", "SIGALRM")
@@ -167,3 +168,12 @@ def test_a_terminal_is_one() -> None:
     assert os.read(near, 99) == b"True True True\r\n"
     os.close(near)
     os.close(far)
+
+
+@pytest.mark.parametrize("more", [{}, {"PYTHONHASHSEED": "7"}], ids=["forked", "started"])
+def test_a_preloaded_library_is_there_however_the_process_begins(
+    more: dict[str, str], tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    words = [forked_python(library(tmp_path_factory)), "-c", "import ctypes; ctypes.CDLL(None).failing_calls_arm"]
+    done = subprocess.run(words, env={**os.environ, **more}, capture_output=True, text=True, check=False, timeout=60)
+    assert (done.returncode, done.stderr) == (0, "")
