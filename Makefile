@@ -10,8 +10,8 @@ BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.set-up
 DEMO_STAMP := $(VENV)/.set-up-demo
 comma := ,
-# Two more than two cores: many tests wait for a real clock or for processes.
-JOBS   ?= 4
+# One more than two cores: many tests wait for a real clock. With four a run takes as long.
+JOBS   ?= 3
 # What is built with the package: set up again when it has changed.
 COMPILED := $(wildcard bluepill_sim/extension/source/*/*) robot_bench/wires/edges.c \
     $(shell find adapter_fw/core adapter_fw/capi adapter_fw/esp32/main adapter_fw/esp32_sim -type f)
