@@ -35,6 +35,7 @@ await page.waitForFunction(() => {
   const { store } = window.p2osPage.app, ticks = store.channels("samples").find(({ name }) => name === "ticks");
   return ticks && (store.whole(ticks.id)?.count ?? 0) > 5;
 }, undefined, LONG);
+await page.getByRole("region", { name: "head, without unit" }).waitFor(); // it was asked for last
 found.plots = await page.getByRole("region").evaluateAll((all) => all.map((one) => one.getAttribute("aria-label")));
 await page.getByRole("button", { name: "Do not watch head" }).click();
 await page.waitForFunction(() => window.p2osPage.app.store.run.value.variables.length === 1, undefined, LONG);
