@@ -10,7 +10,7 @@ from pathlib import Path
 
 from bluepill_sim.core.nvic import VECTOR_COUNT, exception_name
 from bluepill_sim.errors import ImageError
-from bluepill_sim.program.image import Image
+from bluepill_sim.program.image import ELF_MAGIC, Image
 from bluepill_sim.stm32f103 import FLASH_BASE, FLASH_BYTES, FLASH_BYTES_FITTED, SRAM_BASE, SRAM_BYTES
 from simbase.files import read_bytes
 
@@ -75,7 +75,7 @@ def layout(image: Image) -> MemoryLayout:
     """Return the sections of an image and what they add up to; HEX and BIN have no sections."""
     flash_bytes = sum(len(data) for _, data in image.segments)
     data = file_bytes(image)
-    if not data.startswith(b"\x7fELF"):
+    if not data.startswith(ELF_MAGIC):
         return MemoryLayout((), flash_bytes, 0)
     sections = tuple(_sections(data))
     sram = sum(section.size for section in sections if section.in_sram)

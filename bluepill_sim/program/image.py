@@ -31,7 +31,7 @@ _SHF_ALLOC = 2
 _ERASED_WORD = 0xFFFF_FFFF
 #: chosen: of so many files it is known what is in them; a campaign or a session of tests boots the same ones.
 _KEPT = 8
-_ELF_MAGIC = b"\x7fELF"
+ELF_MAGIC = b"\x7fELF"
 #: Types of ELF files that are no programs.
 _NOT_LINKED = {
     "ET_REL": "a compiled source that is not linked (object file)",
@@ -186,7 +186,7 @@ def _parse(data: bytes, name: str) -> Image:
     if not data:
         raise ImageError(f"{name}: the file is empty", hint=_HINT)
     digest = hashlib.sha256(data).hexdigest()
-    if data.startswith(_ELF_MAGIC):
+    if data.startswith(ELF_MAGIC):
         return _parse_elf(data, name, digest)
     if data.startswith(b":") and _is_text(data):
         return _parse_hex(data, name, digest)

@@ -16,12 +16,10 @@ from typing import Any
 
 from bluepill_sim.errors import ImageError
 from bluepill_sim.program.elf_file import file_bytes
-from bluepill_sim.program.image import Image
+from bluepill_sim.program.image import ELF_MAGIC, Image
 from bluepill_sim.stm32f103 import FLASH_BYTES_FITTED, SRAM_BASE, SRAM_BYTES
 from simbase.errors import FileError, MissingDependencyError
 from simbase.files import read_text
-
-_ELF_MAGIC = b"\x7fELF"
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +64,7 @@ def read_lines(image: Image) -> LineTable:
         MissingDependencyError: pyelftools is not installed.
     """
     data = file_bytes(image)
-    if not data.startswith(_ELF_MAGIC):
+    if not data.startswith(ELF_MAGIC):
         return LineTable()
     try:
         from elftools.common.exceptions import DWARFError, ELFError

@@ -11,13 +11,12 @@ from dataclasses import dataclass, replace
 
 from bluepill_sim.program.alterations import Alteration, Site, alterations, it_count, size_at, word_of
 from bluepill_sim.program.elf_file import file_offset
-from bluepill_sim.program.image import Image
+from bluepill_sim.program.image import ELF_MAGIC, Image
 from bluepill_sim.stm32f103 import FLASH_BASE, FLASH_BYTES_FITTED
 
 #: chosen: so far behind a MOVW its MOVT is looked for; compilers put others between the two.
 _MOVT_WITHIN = 4
 _MOVT = (0xFBF0_8000, 0xF2C0_0000)
-_ELF_MAGIC = b"\x7fELF"
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +65,7 @@ def mutants(image: Image, ran: Iterable[int]) -> list[Mutant]:
 
 def mutated_file(data: bytes, mutant: Mutant, image: Image) -> bytes:
     """Return a firmware file with a change: the ELF patched; of HEX and BIN a plain binary for 0x08000000."""
-    if not data.startswith(_ELF_MAGIC):
+    if not data.startswith(ELF_MAGIC):
         end = max(start + len(content) for start, content in image.segments) - FLASH_BASE
         flash = bytearray(b"\xff" * end)
         for start, content in image.segments:

@@ -21,11 +21,10 @@ from typing import Any, TypeAlias
 
 from bluepill_sim.errors import ImageError
 from bluepill_sim.program.elf_file import file_bytes
-from bluepill_sim.program.image import Image, SymbolTable
+from bluepill_sim.program.image import ELF_MAGIC, Image, SymbolTable
 from bluepill_sim.stm32f103 import SRAM_BASE, SRAM_BYTES
 from simbase.errors import MissingDependencyError, UsageError, nearest, shown
 
-_ELF_MAGIC = b"\x7fELF"
 _OP_ADDR, _OP_PLUS_UCONST = 0x03, 0x23
 #: chosen: names that are offered at once; more than a list on a screen has.
 MOST_OFFERED = 60
@@ -236,7 +235,7 @@ def read_variables(image: Image) -> VariableTable:
         MissingDependencyError: pyelftools is not installed.
     """
     data = file_bytes(image)
-    if not data.startswith(_ELF_MAGIC):
+    if not data.startswith(ELF_MAGIC):
         return VariableTable()
     try:
         from elftools.common.exceptions import DWARFError, ELFError

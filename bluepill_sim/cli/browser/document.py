@@ -24,7 +24,7 @@ from bluepill_sim.extension.library import CORE_VARIABLE, FUNCTION_TYPES
 from bluepill_sim.fabric.registers import Peripheral
 from bluepill_sim.native.state import HALT_KINDS
 from bluepill_sim.peripherals.usart import UsartCommand
-from bluepill_sim.program.image import load_image
+from bluepill_sim.program.image import ELF_MAGIC, load_image
 from bluepill_sim.stm32f103 import BASES, SRAM_BASE, SRAM_BYTES
 from simbase.files import read_bytes
 
@@ -159,7 +159,7 @@ def _elf(path: Path) -> bytes:
     """Return an ELF file that is a program for this chip."""
     load_image(path)
     data = read_bytes(path)
-    if not data.startswith(b"\x7fELF"):
+    if not data.startswith(ELF_MAGIC):
         hint = "give the .elf that the .bin or .hex was made of"
         raise BluePillError(f"{path}: the page takes ELF files alone", hint=hint)
     return data

@@ -15,7 +15,6 @@ import shutil
 import subprocess
 import time
 from collections.abc import Iterator
-from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import cast
 
@@ -125,7 +124,10 @@ def headless_page() -> Iterator[HeadlessPage]:
         )
     theirs_in, commands = os.pipe()
     answers, theirs_out = os.pipe()
-    with TemporaryDirectory(prefix="p2os-render-") as folder, contextlib.ExitStack() as ends:
+    with (
+        TemporaryDirectory(prefix="p2os-render-", ignore_cleanup_errors=True) as folder,
+        contextlib.ExitStack() as ends,
+    ):
         words = [
             "--headless", "--remote-debugging-pipe", "--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader",
             "--hide-scrollbars", "--no-first-run", "--disable-background-networking", f"--user-data-dir={folder}",
@@ -155,5 +157,3 @@ def headless_page() -> Iterator[HeadlessPage]:
                 browser.wait(5.0)
             browser.kill()
             browser.wait()
-            shutil.rmtree(folder, ignore_errors=True)
-            Path(folder).mkdir(exist_ok=True)  # what the block takes away is there

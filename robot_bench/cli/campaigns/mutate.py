@@ -13,7 +13,7 @@ import typer
 from bluepill_sim.analysis.coverage import Coverage
 from bluepill_sim.board import BluePill
 from bluepill_sim.program.elf_file import file_bytes
-from bluepill_sim.program.image import Image
+from bluepill_sim.program.image import ELF_MAGIC, Image
 from bluepill_sim.program.line_table import read_lines
 from bluepill_sim.program.mutants import Mutant, mutants, mutated_file
 from bluepill_sim.program.static_code import StaticCode
@@ -261,7 +261,7 @@ def _write(mutation: Mutation, image: Image, folder: Path) -> None:
         FileError: The folder cannot be written.
     """
     data = file_bytes(image)
-    suffix = ".elf" if data.startswith(b"\x7fELF") else ".bin"
+    suffix = ".elf" if data.startswith(ELF_MAGIC) else ".bin"
     with writing(folder):
         for mutant in mutation.survivors:
             name = f"{mutant.address:08x}-{mutant.alteration.code.hex()}{suffix}"

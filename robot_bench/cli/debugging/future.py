@@ -122,6 +122,8 @@ class Future:
         self._hits: list[tuple[Nanos, int, str]] = []
         #: What was seen of the watched variables since that was taken.
         self._seen: list[SeenStretch] = []
+        #: When they were looked at last.
+        self._seen_until: Nanos = 0
         self._take(bench, hands)
         #: Until when all is known: who records it says so.
         self.known_ns: Nanos = bench.events.released_until
@@ -166,9 +168,6 @@ class Future:
             self._seen.append(SeenStretch(begun))
         self._seen[-1].until_ns = self._seen_until = at
         self._seen[-1].rows += [(at, name, value) for name, value in changes]
-
-    #: When the variables were looked at last.
-    _seen_until: Nanos = 0
 
     @property
     def hands(self) -> Sequence[Hand]:

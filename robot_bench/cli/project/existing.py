@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from adapter_sim.pinout import WireRole, load_pinout
-from bluepill_sim.program.image import load_image
+from bluepill_sim.program.image import ELF_MAGIC, load_image
 from robot_bench.bench import Bench
 from robot_bench.cli.project.files import text_of_package
 from simbase.errors import FileError, UsageError, shown_name
@@ -29,7 +29,6 @@ WATCHED = "2 s"
 MOST_WIRES = 3
 #: Wires that a program drives.
 OUTPUTS = (WireRole.CONNECT, WireRole.RESET, WireRole.MOTOR)
-_ELF_MAGIC = b"\x7fELF"
 #: Of CMake's presets: `${hostSystemName}`, `$env{HOME}`.
 _MACRO = re.compile(r"\$\w*\{[^}]*\}")
 _PRESETS = ("CMakePresets.json", "CMakeUserPresets.json")
@@ -196,7 +195,7 @@ def _programs(folder: Path, pattern: str) -> list[Path]:
 def _is_elf(path: Path) -> bool:
     try:
         with path.open("rb") as stream:
-            return stream.read(len(_ELF_MAGIC)) == _ELF_MAGIC
+            return stream.read(len(ELF_MAGIC)) == ELF_MAGIC
     except OSError:
         return False
 

@@ -13,12 +13,13 @@ import queue
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.program.image import load_image
-from bluepill_sim.program.variables import read_variables
+from bluepill_sim.program.variables import VariableTable, read_variables
 from p2os.cli.robots.drive_deadman import DriveDeadman
 from p2os.transport.wall_clock import Clock, wall_clock
 from p2os.view.header import PageHeader, PanelHeader, PanelState
@@ -41,7 +42,7 @@ from robot_bench.view.run_tracks import RunTracks
 from robot_bench.view.variable_track import VariableTrack
 from robot_bench.wires.edges import Edges
 from simbase.errors import UsageError
-from simbase.files import writing
+from simbase.files import write_text
 from simbase.timing import Nanos
 
 #: chosen: commands that may wait; a person gives some a second.
@@ -132,8 +133,10 @@ class LiveRun:
         self._seen: dict[tuple[str, str], VariableTrack] = {}
         self._blocks: dict[str, Blocks] = {}
         self._speed, self._on_wait, self._clock = speed, on_wait, clock
-        self._variables, self._firmware = variables, scenario.firmware
+        self._variables = variables
         self._panels: dict[str, ViewPanel] = {}
+        #: Whose chip the panels show.
+        self._shown_bench: Bench | None = None
         #: What pages look at, by panel and choice, and what each showed last.
         self._looked: dict[tuple[str, str], PanelState | None] = {}
         self._wanted: set[tuple[str, str]] = set()
@@ -170,9 +173,14 @@ class LiveRun:
     def offered(self, begun: str) -> Sequence[str]:
         """Return names of variables that what was typed may become."""
         try:
-            return read_variables(load_image(self._firmware)).offered(begun)
+            return self._table.offered(begun)
         except BluePillError:
             return ()
+
+    @cached_property
+    def _table(self) -> VariableTable:
+        """The program's variables; read once, for each letter that is typed asks for them."""
+        return read_variables(load_image(self._scenario.firmware))
 
     def look(self, panel: str, choice: str) -> PanelState | None:
         """Return what a panel showed last; while it is asked for, it is looked at ten times a second."""
@@ -193,7 +201,7 @@ class LiveRun:
         self._folder = TemporaryDirectory(prefix="p2os-view-")
         session = self._session = RunSession(bench, self, Path(self._folder.name), self._speed)
         session.watch(self._variables)
-        self._panels = {one.name: one for one in panels}
+        self._panels, self._shown_bench = {one.name: one for one in panels}, bench
         try:
             while not session.is_over or session.is_running:
                 self._turn(session)
@@ -269,9 +277,6 @@ class LiveRun:
             if found != self._looked.get((panel, choice)):
                 self._looked[panel, choice] = found
 
-    #: Whose chip the panels show.
-    _shown_bench: Bench | None = None
-
     def _hand_over_variables(self, session: RunSession) -> None:
         for future, types in session.watched():
             if stretches := future.take_seen():
@@ -290,8 +295,7 @@ class LiveRun:
     def _write(self, name: str, text: str, *, is_beside: bool = False) -> Path:
         place = self._place()
         path = (place.parent if is_beside else place) / name
-        with writing(path):
-            path.write_text(text, encoding="utf-8")
+        write_text(path, text)
         return path
 
     def _show(self, state: RunState) -> None:

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from bluepill_sim.board import BluePill
-from bluepill_sim.program.image import Image
+from bluepill_sim.program.image import ELF_MAGIC, Image
 from bluepill_sim.program.mutants import Mutant, mutated_file
 from bluepill_sim.program.static_code import StaticCode
 from robot_bench.campaign.variants.mutation.trial import Fate, MutantResult
@@ -113,7 +113,7 @@ class Suite:
             cpu_s: So much of a processor it may take; the process that takes more is ended by SIGXCPU.
         """
         resource.setrlimit(resource.RLIMIT_CPU, (cpu_s, cpu_s))
-        suffix = ".elf" if self.data.startswith(b"\x7fELF") else ".bin"
+        suffix = ".elf" if self.data.startswith(ELF_MAGIC) else ".bin"
         with writing_temporary():
             made = tempfile.TemporaryDirectory(prefix="p2os-mutant-")
         with made as folder:
