@@ -7,7 +7,6 @@ from tests.documentation.readability import CELL, LONGEST, MAP_WORDS, MEAN, ROOT
 #: Pages that break a rule still: mean and longest sentence, wide cells, phrases of ours. A figure may only fall.
 CEILINGS = {
     "CONTRIBUTING.md": (23.7, 85, 0, 5),
-    "docs/campaigns.md": (25.4, 70, 5, 3),
     "docs/client.md": (21.9, 51, 11, 3),
     "docs/pioneer.md": (20.1, 96, 19, 1),
     "docs/ros.md": (19.5, 56, 3, 0),
