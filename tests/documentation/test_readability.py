@@ -8,7 +8,6 @@ from tests.documentation.readability import CELL, LONGEST, MAP_WORDS, MEAN, ROOT
 CEILINGS = {
     "CONTRIBUTING.md": (23.7, 85, 0, 5),
     "docs/client.md": (21.9, 51, 11, 3),
-    "docs/pioneer.md": (20.1, 96, 19, 1),
     "docs/ros.md": (19.5, 56, 3, 0),
     "docs/experiments.md": (23.5, 57, 1, 2),
     "docs/worlds.md": (18.7, 42, 7, 0),
