@@ -44,7 +44,7 @@ OURS = {
     r"\bwhat became of\b": "the result of",
     r"\bcame to nothing\b": "failed",
     r"\bmakes? good\b": "corrects",
-    r"\bis none\b": "is not one",
+    r"(?-i:\bis none\b)": "is not one",
     r"\bof (?:ours|theirs|yours)\b": "our, their, your",
     r"\bof one's own\b": "your own",
     r"\b(?:mends?|mended)\b": "fix",
