@@ -11,7 +11,6 @@ Invariant: what comes of a trial depends on the trial alone, not on how many run
 """
 
 import contextlib
-import gc
 import os
 import resource
 import signal
@@ -75,7 +74,6 @@ class Processes:
         running: dict[Connection, tuple[int, int, ForkProcess]] = {}
         with writing_temporary():
             made = tempfile.TemporaryDirectory(prefix="p2os-campaign-")
-        gc.freeze()
         with made as folder:
             try:
                 while running or waiting:
@@ -93,7 +91,6 @@ class Processes:
                         else:
                             on_worked(place, worked or (_error("its process was killed, again and again"), 0.0))
             finally:
-                gc.unfreeze()
                 for _, _, process in running.values():
                     process.kill()
                     process.join()

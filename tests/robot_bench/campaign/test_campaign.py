@@ -1,6 +1,7 @@
 """A campaign from its file to its folder, with runs of seconds: the same set whatever happens on the way."""
 
 import contextlib
+import gc
 import itertools
 import json
 import os
@@ -483,8 +484,9 @@ def outcomes(workers: Processes, trials: Sequence[Trial]) -> dict[int, Outcome]:
 def test_a_process_comes_to_what_this_one_comes_to(trials: list[Trial], monkeypatch: pytest.MonkeyPatch) -> None:
     warmed: list[Trial] = []
     monkeypatch.setattr(processes, "warm_up", lambda trial: (warmed.append(trial), warm_up(trial)))
-    workers = Processes(2, RunLimits())
+    workers, frozen = Processes(2, RunLimits()), gc.get_freeze_count()
     found = outcomes(workers, trials)
+    assert gc.get_freeze_count() == frozen, "what this process keeps out of the search for garbage stays out"
     other = trials[0].set(("mode", "adapter"))
     outcomes(workers, [trials[0], other])
     assert warmed == [trials[0], other], "what is loaded is not loaded again"
