@@ -65,7 +65,7 @@ def write_page(rows: Sequence[Row]) -> None:
 def _table(rows: Sequence[Row], results: Sequence[Result]) -> str:
     known = {result.name: result for result in results}
     lines = [
-        "| row | source | program | required result | last run |",
+        "| row | source | program | required result | passed in |",
         "|---|---|---|---|---|",
     ]
     for row in rows:
@@ -95,8 +95,9 @@ def _shown(row: Row, result: Result | None) -> str:
     if result is None:
         shown = row.tried or "not run"
     else:
-        text = "" if result.status is RowStatus.PASSED else f": {result.text}"
-        shown = f"{_ended(result)}{', busy' if result.notes else ''}{text}"
+        has_passed = result.status is RowStatus.PASSED
+        ended = f"{result.seconds:.0f} s" if has_passed else f"{_ended(result)}: {result.text}"
+        shown = f"{ended}{', busy' if result.notes else ''}"
     return f"{shown}. Found: {row.found}" if row.found else shown
 
 
