@@ -63,6 +63,16 @@ class Nearest:
         """Return the files of tests nearest to a line, at most `MOST_FILES`."""
         return self._of_python(path, line) if path.endswith(".py") else self._of_c(path)
 
+    def made_of(self, test: str) -> tuple[str, ...]:
+        """Return what a file of tests says by: itself, what of its own folder it imports, and the data beside it."""
+        folder = test.rpartition("/")[0]
+        modules = {f"{name.replace('.', '/')}.py" for name in self._imported_by(test)} & {*self._imports}
+        data = {
+            path.relative_to(self._root).as_posix()
+            for path in (self._root / folder).iterdir() if path.is_file() and path.suffix != ".py"
+        }  # fmt: skip
+        return tuple(sorted({test, *data, *(name for name in modules if name.rpartition("/")[0] == folder)}))
+
     def _of_python(self, path: str, line: int) -> tuple[str, ...]:
         by_name = self._by_name(path)
         files = self._counted.get(path, {})
