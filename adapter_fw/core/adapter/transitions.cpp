@@ -17,15 +17,12 @@ constexpr std::int32_t ENABLES = 2;
 
 void Adapter::clear() {
   agenda_ = {};
-  next_sample_ = now_;
   majority_.reset();
   left_duty_.reset();
   right_duty_.reset();
   connect_.reset();
   pad_.lose();
-  plausibility_.begin(now_);
   pacer_.begin({});
-  distances_.forget();
   // Absolute: where the wheels stand outlives a reset.
   encoders_.begin(encoders_.travel_nm());
   encoders_.forget_jumps();
@@ -169,7 +166,6 @@ void Adapter::halt(Nanos now) {
   client_.abandon();
   agenda_.stops_left = settings_.stop_repeats;
   agenda_.stop_at = now + settings_.stop_repeat_ns;
-  distances_.forget();
   pacer_.begin({});
   outputs_.show_safe(now);
 }
