@@ -69,8 +69,17 @@ void check_duties() {
 
   meter.restart(false);
   claim(meter.duty(50 * NS_PER_MS) == 0, "a wire that is low has no duty");
+  meter.edge(true, 50 * NS_PER_MS, 20'000);
+  claim(meter.duty(50 * NS_PER_MS) == 0, "one rising edge is no period yet");
   meter.restart(true);
-  claim(meter.duty(50 * NS_PER_MS) == 1'000, "one that is high has all of it");
+  claim(meter.duty(200 * NS_PER_MS) == 1'000, "one that is high has all of it");
+  meter.edge(false, 200 * NS_PER_MS, 30'000);
+  meter.edge(true, 201 * NS_PER_MS, 31'000);
+  claim(meter.duty(201 * NS_PER_MS) == 1'000, "nor is the first after a level");
+  meter.edge(true, 201 * NS_PER_MS, 31'000);
+  meter.edge(false, 201 * NS_PER_MS, 31'000);
+  meter.edge(true, 201 * NS_PER_MS, 31'000);
+  claim(meter.duty(201 * NS_PER_MS) == 1'000, "edges of one instant leave it");
 
   adapter::DutyMeter wraps(25 * NS_PER_MS);
   const std::uint32_t stamps[] = {0xFFFF'FF00U, 0xFFFF'FF80U, 0x100U};
