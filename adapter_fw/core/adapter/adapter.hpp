@@ -203,7 +203,7 @@ class Adapter final : private p2os::ClientListener {
   std::size_t baud_ = 0;
   Nanos now_;
   Nanos next_sample_;
-  Nanos deadline_;
+  Nanos deadline_{};
   Agenda agenda_;
 };
 

@@ -5,6 +5,7 @@
 
 #include <cstdio>
 #include <cstring>
+#include <initializer_list>
 
 #include "../../core/adapter/inputs.hpp"
 #include "../../core/app/code_keeper.hpp"
@@ -429,6 +430,21 @@ void check_client() {
   claim(client.stats().frames_received == 6 && client.stats().malformed == 1, "packets are counted, heard or not");
   client.advance_to(opened_at + p2os::LIVENESS_NS);
   claim(client.state() == p2os::ClientState::LOST, "and silence ends it");
+  const auto says = [&client, &frame](std::initializer_list<std::uint8_t> kinds) {
+    bool is_so = true;
+    for (const std::uint8_t kind : kinds) {
+      is_so = client.take_output(frame) && frame.bytes()[3] == kind && is_so;
+    }
+    return is_so && !client.take_output(frame);
+  };
+  taken();
+  const Nanos lost_at = opened_at + p2os::LIVENESS_NS;
+  client.connect(lost_at);
+  claim(client.state() == p2os::ClientState::RECOVERING && says({29, 11, 2}), "a lost robot is stopped and closed first");
+  client.advance_to(lost_at + p2os::CLOSE_WAIT_NS - 1);
+  claim(says({}), "that takes 200 ms");
+  client.advance_to(lost_at + p2os::CLOSE_WAIT_NS);
+  claim(client.state() == p2os::ClientState::SYNC0 && says({29, 11, 21, 0}), "then it is asked for its SYNC0");
   for (const std::uint8_t kind : {std::uint8_t{0xFD}, std::uint8_t{0xFE}, std::uint8_t{0xFF}}) {
     p2os::Client other({});
     other.receive(Packet(kind, 1).bytes(), open(other));
