@@ -17,6 +17,7 @@ from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from bluepill_sim.cli.gdb_server import GdbPort
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.program.image import load_image
 from bluepill_sim.program.variables import VariableTable, read_variables
@@ -29,6 +30,7 @@ from p2os.view.run_control import MOST_DPS, MOST_MPS, RunCommand, RunState
 from p2os.view.targets import ViewPanel, panels_of
 from robot_bench.bench import Bench, run_of
 from robot_bench.cli.debugging.future import Future, SeenStretch
+from robot_bench.cli.debugging.gdb_beside import GdbBeside
 from robot_bench.cli.debugging.session import MAIN, RunSession
 from robot_bench.cli.shown.offered_hands import hands_of
 from robot_bench.cli.shown.saved_hands import pytest_text, scenario_text
@@ -49,6 +51,8 @@ from simbase.timing import Nanos
 MOST_COMMANDS = 64
 #: chosen: panels that are looked at ten times a second, of all pages together.
 MOST_LOOKS, LOOK_NS = 12, 100_000_000
+#: chosen: how long a command of a page waits at most while GDB is listened for, seconds.
+GDB_WAIT_S = 0.02
 #: chosen: how long a signal may wait to be looked at where a run stands still, seconds.
 _WAIT_S = 0.2
 
@@ -115,6 +119,7 @@ class LiveRun:
         variables: Names of the program's variables that are watched from the beginning.
         on_wait: Called while it stands still; may raise to end the run.
         clock: Wall clock, ns.
+        gdb: Where GDB comes, beside the page: it stands at first until that, or a page lets it go; None: it does not.
     """
 
     def __init__(
@@ -125,7 +130,10 @@ class LiveRun:
         variables: Sequence[str] = (),
         on_wait: Callable[[], None] = lambda: None,
         clock: Clock = wall_clock,
+        gdb: GdbPort | None = None,
     ) -> None:
+        self._gdb_port = gdb
+        self._gdb: GdbBeside | None = None
         self._scenario = scenario
         self._recording = ViewRecording(PageHeader(title=scenario.name, hands=hands_of(scenario)))
         self._tracks: dict[str, RunTracks] = {}
@@ -199,7 +207,9 @@ class LiveRun:
         self.source.offer(BenchBuilt(meta, [one.header for one in panels]), bench.now, is_kept=True)
         self._run_folder = None if bench.trace.path is None else bench.trace.path.parent
         self._folder = TemporaryDirectory(prefix="p2os-view-")
-        session = self._session = RunSession(bench, self, Path(self._folder.name), self._speed)
+        waits = "" if self._gdb_port is None else f"waiting for GDB on port {self._gdb_port.port}"
+        session = self._session = RunSession(bench, self, Path(self._folder.name), self._speed, waits)
+        self._gdb = None if self._gdb_port is None else GdbBeside(session, self._gdb_port)
         session.watch(self._variables)
         self._panels, self._shown_bench = {one.name: one for one in panels}, bench
         try:
@@ -239,6 +249,9 @@ class LiveRun:
         self._show(session.state())
         if wait_s:
             self._on_wait()
+        if self._gdb is not None:
+            self._gdb.serve(min(wait_s, GDB_WAIT_S))
+            wait_s = 0
         try:
             command = self._commands.get(block=wait_s > 0, timeout=wait_s or None)
         except queue.Empty:

@@ -3,10 +3,14 @@
 import contextlib
 import gc
 from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
+from bluepill_sim.cli.gdb_server import GdbPort
 from p2os.view.live import StillRecording
 from p2os.view.targets import ViewTarget
+from robot_bench.cli.debugging.gdb import say_where
 from robot_bench.cli.shown.live_run import LiveRun
 from robot_bench.recording.run_folder import make_next_folder
 from robot_bench.recording.run_record import TRACE_NAME, read_run
@@ -16,6 +20,7 @@ from robot_bench.report.page_of_all import report_of_all
 from robot_bench.report.run_page import run_report, run_sections
 from robot_bench.run import run_scenario
 from robot_bench.scenario.loading import known_scenarios, load_scenario
+from robot_bench.scenario.scenario import Scenario
 
 
 def run_target(named: str) -> ViewTarget | None:
@@ -60,14 +65,25 @@ def scenario_target(named: str) -> ViewTarget | None:
     if named not in known_scenarios() and not named.endswith(".toml"):
         return None
     scenario = load_scenario(named, trust=False)
-    live = LiveRun(scenario)
+    return replace(_live_target(scenario), debugged=partial(_debugged, scenario))
+
+
+def _debugged(scenario: Scenario, port: int) -> ViewTarget:
+    opened = GdbPort(port)
+    say_where(opened.port, scenario)
+    return _live_target(scenario, opened)
+
+
+def _live_target(scenario: Scenario, gdb: GdbPort | None = None) -> ViewTarget:
+    live = LiveRun(scenario, gdb=gdb)
     live.stays = True
 
     def run() -> None:
-        done = run_scenario(scenario, make_next_folder(scenario.name), drive=live.drive)
-        if done.was_interrupted:
-            raise KeyboardInterrupt
-        live.source.report(run_report(read_run(done.folder)).header)
-        live.stay()
+        with contextlib.closing(gdb) if gdb is not None else contextlib.nullcontext():
+            done = run_scenario(scenario, make_next_folder(scenario.name), drive=live.drive)
+            if done.was_interrupted:
+                raise KeyboardInterrupt
+            live.source.report(run_report(read_run(done.folder)).header)
+            live.stay()
 
     return ViewTarget(source=live.source, run=run)

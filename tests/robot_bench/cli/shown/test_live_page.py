@@ -166,12 +166,19 @@ def test_run_view_is_the_run_without_and_prints_the_link(
     assert hash_of(tmp_path / "with") == hash_of(tmp_path / "without")
 
 
-@pytest.mark.parametrize("beside", [["--gdb", "1"], ["--foxglove"], ["--seeds", "1-2"], ["--port", "tcp:127.0.0.1:9"]])
+@pytest.mark.parametrize("beside", [["--foxglove"], ["--seeds", "1-2"], ["--port", "tcp:127.0.0.1:9"]])
 def test_what_cannot_stand_beside_a_page_is_said(beside: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert p2os(["run", "motors", "--view", *beside]) == 2
     said = capsys.readouterr().err
     assert said.startswith("p2os: --view cannot stand beside ")
     assert "hint: " in said
+
+
+def test_gdb_is_for_a_scenario_that_runs(alone: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert p2os(["view", str(alone), "--no-browser", "--gdb"]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("p2os: --gdb is for a scenario that runs, and ")
+    assert "hint: p2os view dodge --gdb" in said
 
 
 def test_a_browser_is_opened_unless_told_otherwise(monkeypatch: pytest.MonkeyPatch) -> None:
