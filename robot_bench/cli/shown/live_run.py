@@ -9,7 +9,6 @@ Invariant: nobody who looks on decides anything: the trace is the same with and 
 """
 
 import os
-import queue
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -23,6 +22,7 @@ from bluepill_sim.program.image import load_image
 from bluepill_sim.program.variables import VariableTable, read_variables
 from p2os.cli.robots.drive_deadman import DriveDeadman
 from p2os.transport.wall_clock import Clock, wall_clock
+from p2os.view.command_queue import CommandQueue
 from p2os.view.header import PageHeader, PanelHeader, PanelState
 from p2os.view.live import LiveRecording
 from p2os.view.recording import ViewRecording
@@ -47,8 +47,6 @@ from simbase.errors import UsageError
 from simbase.files import write_text
 from simbase.timing import Nanos
 
-#: chosen: commands that may wait; a person gives some a second.
-MOST_COMMANDS = 64
 #: chosen: panels that are looked at ten times a second, of all pages together.
 MOST_LOOKS, LOOK_NS = 12, 100_000_000
 #: chosen: how long a command of a page waits at most while GDB is listened for, seconds.
@@ -149,7 +147,7 @@ class LiveRun:
         self._looked: dict[tuple[str, str], PanelState | None] = {}
         self._wanted: set[tuple[str, str]] = set()
         self._looked_at: Nanos = 0
-        self._commands: queue.SimpleQueue[RunCommand] = queue.SimpleQueue()
+        self._commands = CommandQueue()
         #: How the run stands; None before it has begun.
         self._state = RunState(is_running=True, speed=speed)
         self._session: RunSession | None = None
@@ -172,11 +170,8 @@ class LiveRun:
         return self._state
 
     def offer(self, command: RunCommand) -> bool:
-        """Take a command; False where too many wait."""
-        if self._commands.qsize() >= MOST_COMMANDS:
-            return False
-        self._commands.put(command)
-        return True
+        """Take a command; False where too many wait, but for those that stop."""
+        return self._commands.offer(command)
 
     def offered(self, begun: str) -> Sequence[str]:
         """Return names of variables that what was typed may become."""
@@ -252,11 +247,8 @@ class LiveRun:
         if self._gdb is not None:
             self._gdb.serve(min(wait_s, GDB_WAIT_S))
             wait_s = 0
-        try:
-            command = self._commands.get(block=wait_s > 0, timeout=wait_s or None)
-        except queue.Empty:
-            return
-        self._do(session, command)
+        if (command := self._commands.take(wait_s)) is not None:
+            self._do(session, command)
 
     def _do(self, session: RunSession, command: RunCommand) -> None:
         """Do what was asked for."""

@@ -16,13 +16,14 @@ websockets = pytest.importorskip("websockets.sync.client")
 from p2os.cli.captures.shown_page import shown  # noqa: E402
 from p2os.cli.main import run as p2os  # noqa: E402
 from p2os.view import targets as view_targets  # noqa: E402
+from p2os.view.command_queue import MOST_COMMANDS  # noqa: E402
 from p2os.view.header import PageHeader  # noqa: E402
 from p2os.view.live import MOST_WAITING, StillRecording  # noqa: E402
 from p2os.view.recording import ViewRecording  # noqa: E402
 from p2os.view.run_control import RunCommand  # noqa: E402
 from p2os.view.server.serving import ViewServer, serving  # noqa: E402
 from robot_bench.cli.shown import targets  # noqa: E402
-from robot_bench.cli.shown.live_run import MOST_COMMANDS, LiveRun  # noqa: E402
+from robot_bench.cli.shown.live_run import LiveRun  # noqa: E402
 from robot_bench.cli.shown.targets import run_target, scenario_target  # noqa: E402
 from robot_bench.recording.run_record import read_run  # noqa: E402
 from robot_bench.report.run_page import run_report  # noqa: E402
