@@ -73,3 +73,11 @@ def test_who_waits_is_woken_by_what_comes_from_another_thread() -> None:
     waiting.join(60.0)
     assert found == [STOP]
     assert queue.take() is None
+
+
+def test_stops_come_before_what_waited_and_drop_what_was_to_be_driven() -> None:
+    queue = CommandQueue()
+    pause, drive = RunCommand(do="pause"), RunCommand(do="drive", forward_mps=0.1)
+    for command in (pause, drive, STOP, LET_GO, drive):
+        assert queue.offer(command)
+    assert [queue.take() for _ in range(5)] == [STOP, LET_GO, pause, drive, None]
