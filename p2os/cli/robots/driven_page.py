@@ -13,11 +13,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Protocol
 
+from p2os.cli.robots.command_queue import CommandQueue
 from p2os.cli.robots.drive_deadman import DriveDeadman
 from p2os.client import Link
 from p2os.client.notices import DeadmanStopped, GapStopped, LinkLost, LinkLostError, MotorsDisabled, Notice
 from p2os.transport.wall_clock import Clock, GapWatch, wall_clock
-from p2os.view.command_queue import CommandQueue
 from p2os.view.run_control import RunCommand, RunState
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 

@@ -20,9 +20,9 @@ from bluepill_sim.cli.gdb_server import GdbPort
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.program.image import load_image
 from bluepill_sim.program.variables import VariableTable, read_variables
+from p2os.cli.robots.command_queue import CommandQueue
 from p2os.cli.robots.drive_deadman import DriveDeadman
 from p2os.transport.wall_clock import Clock, wall_clock
-from p2os.view.command_queue import CommandQueue
 from p2os.view.header import PageHeader, PanelHeader, PanelState
 from p2os.view.live import LiveRecording
 from p2os.view.recording import ViewRecording

@@ -11,10 +11,10 @@ from collections.abc import Callable
 import pytest
 
 from p2os.cli.main import run as p2os
+from p2os.cli.robots.command_queue import MOST_COMMANDS
 from p2os.cli.robots.driven_page import TURN_NS, PageDriver
 from p2os.client import Link
 from p2os.client.notices import DeadmanStopped, LinkLostError, Notice
-from p2os.view.command_queue import MOST_COMMANDS
 from p2os.view.run_control import DRIVE_HOLD_NS, RunCommand
 from tests.p2os.cli.driven import AT_ONCE_S, COMMAND, STOP, VEL, RecordingRobot
 

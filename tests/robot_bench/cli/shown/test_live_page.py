@@ -15,8 +15,8 @@ websockets = pytest.importorskip("websockets.sync.client")
 
 from p2os.cli.captures.shown_page import shown  # noqa: E402
 from p2os.cli.main import run as p2os  # noqa: E402
+from p2os.cli.robots.command_queue import MOST_COMMANDS  # noqa: E402
 from p2os.view import targets as view_targets  # noqa: E402
-from p2os.view.command_queue import MOST_COMMANDS  # noqa: E402
 from p2os.view.header import PageHeader  # noqa: E402
 from p2os.view.live import MOST_WAITING, StillRecording  # noqa: E402
 from p2os.view.recording import ViewRecording  # noqa: E402

@@ -7,7 +7,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
-from p2os.view.command_queue import CommandQueue, is_stop
+from p2os.cli.robots.command_queue import CommandQueue, is_stop
 from p2os.view.run_control import RunCommand
 
 MOST = 4
