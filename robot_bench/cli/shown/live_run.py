@@ -200,7 +200,8 @@ class LiveRun:
         meta = meta_of(bench.scenario, bench.parts.world, run_of(bench).note, is_at_port=False)
         panels = panels_of(bench.chip)
         self.source.offer(BenchBuilt(meta, [one.header for one in panels]), bench.now, is_kept=True)
-        self._run_folder = None if bench.trace.path is None else bench.trace.path.parent
+        has_folder = bench.trace.path is not None and bench.scenario.has_robot
+        self._run_folder = bench.trace.path.parent if has_folder and bench.trace.path is not None else None
         self._folder = TemporaryDirectory(prefix="p2os-view-")
         waits = "" if self._gdb_port is None else f"waiting for GDB on port {self._gdb_port.port}"
         session = self._session = RunSession(bench, self, Path(self._folder.name), self._speed, waits)
