@@ -47,7 +47,7 @@ class MotorWatch(Watch):
         #: When the last of them changed.
         self._changed: Nanos = 0
         self._failure = ""
-        #: What follows from the levels, worked out once for all that asks while they stay; None: not since they changed.
+        #: What follows from the levels, worked out once while they stay; None: not since they changed.
         self._values: tuple[int, int] | None = None
         self._motions: str | None = None
 

@@ -520,7 +520,8 @@ def test_a_process_does_some_trials_and_none_after_one_that_it_broke_at(trials: 
     monkeypatch.setattr(processes, "MOST_WORKS", 2)
     found = outcomes(Processes(1, RunLimits()), [trials[0].set(("seed", seed)) for seed in range(6)])
     pids = [found[place].sha256 for place in range(6)]
-    assert pids[0] == pids[1] != pids[2] and pids[4] == pids[5] not in pids[:4]
+    assert pids[0] == pids[1] != pids[2]
+    assert pids[4] == pids[5] not in pids[:4]
     assert found[3].failures == ("this is a bug: KeyError: 3",)
 
 
