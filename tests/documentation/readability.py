@@ -179,7 +179,7 @@ NOT_READ = {"CHANGELOG.md", "docs/registers.md", "docs/sequences.md", "docs/inst
 
 def read_pages() -> dict[str, Reading]:
     """Every page that is held to the rules."""
-    names = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md")])
+    names = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
     return {
         name: Reading(path.read_text(encoding="utf-8"))
         for path in names if (name := path.relative_to(ROOT).as_posix()) not in NOT_READ
