@@ -41,11 +41,13 @@ class ThingKind:
     """A kind of thing.
 
     Args:
+        doc: What it is.
         measures: Key → the range that it has where the file gives none.
         boxes: Of drawn measures the boxes and cylinders, in metres and degrees about its own place and heading.
         walks: Whether it moves along its heading, by `way_m` at `speed_mps`, to and fro.
     """
 
+    doc: str
     measures: Mapping[str, tuple[float, float]]
     boxes: Callable[[Measures], Sequence[Table]]
     walks: bool = False
@@ -93,19 +95,25 @@ def _doorway(measures: Measures) -> Sequence[Table]:
 
 #: Kind → what it is made of.
 KINDS: Mapping[str, ThingKind] = {
-    "post": ThingKind({"width_m": (0.04, 0.3)}, _post),
+    "post": ThingKind("a cylinder", {"width_m": (0.04, 0.3)}, _post),
     "box": ThingKind(
-        {"length_m": (0.1, 0.8), "width_m": (0.1, 0.6)},
+        "a box", {"length_m": (0.1, 0.8), "width_m": (0.1, 0.6)},
         lambda measures: [_box(0.0, 0.0, measures["length_m"], measures["width_m"])],
     ),
     "wall": ThingKind(
-        {"length_m": (0.6, 2.5)}, lambda measures: [_box(0.0, 0.0, measures["length_m"], WALL_M)],
+        "8 cm thick", {"length_m": (0.6, 2.5)}, lambda measures: [_box(0.0, 0.0, measures["length_m"], WALL_M)],
     ),
-    "dead-end": ThingKind({"width_m": (0.8, 1.6), "depth_m": (0.6, 1.6)}, _dead_end),
-    "gap": ThingKind({"width_m": (0.5, 1.2), "length_m": (0.4, 1.2)}, _gap),
-    "corner": ThingKind({"length_m": (0.6, 1.6)}, _corner),
-    "doorway": ThingKind({"width_m": (0.7, 1.2), "length_m": (0.8, 2.0), "depth_m": (0.1, 0.4)}, _doorway),
+    "dead-end": ThingKind(
+        "three walls, open to its heading; inside measures", {"width_m": (0.8, 1.6), "depth_m": (0.6, 1.6)}, _dead_end
+    ),
+    "gap": ThingKind("two walls of that length in a line", {"width_m": (0.5, 1.2), "length_m": (0.4, 1.2)}, _gap),
+    "corner": ThingKind("two walls at a right angle, open to its heading", {"length_m": (0.6, 1.6)}, _corner),
+    "doorway": ThingKind(
+        "a wall with a door between two lengths, jambs of that depth",
+        {"width_m": (0.7, 1.2), "length_m": (0.8, 2.0), "depth_m": (0.1, 0.4)}, _doorway,
+    ),
     "walker": ThingKind(
+        "a cylinder that walks to and fro along its heading",
         {"width_m": (0.2, 0.5), "way_m": (1.0, 4.0), "speed_mps": (0.1, 0.6)}, _post, walks=True,
     ),
 }  # fmt: skip

@@ -20,7 +20,7 @@ from p2os.pioneer.world import model as world
 from p2os.robots import model_file
 from p2os.toml_record import keys_of
 from p2os.toml_schema import Key
-from robot_bench.campaign import campaign_file
+from robot_bench.campaign import campaign_file, things
 from robot_bench.direct.differential import robot_file
 from robot_bench.scenario.goals.kinds import every_kind
 from robot_bench.scenario.hands.doing import ACTION_TABLES
@@ -173,6 +173,15 @@ def exports() -> str:
     return "\n".join(rows)
 
 
+def drawn_things() -> str:
+    """Return the kinds of things that a campaign draws, with the range of each measure."""
+    rows = ["| `kind` | measures, where the file says nothing | is |", "|---|---|---|"]
+    for name, kind in things.KINDS.items():
+        measures = ", ".join(f"`{key}` {words}" for key, words in plain(kind.measures).items())
+        rows.append(_row([f"`{name}`", measures, kind.doc]))
+    return "\n".join(rows)
+
+
 def tables() -> dict[str, str]:
     """Return every generated table by its name."""
     robots = {f"`[{name}]`": plain(keys) for name, keys in model_file.RANGES.items()}
@@ -191,9 +200,11 @@ def tables() -> dict[str, str]:
         "goals": kinds_table("kind", "met when", {name: (one.table, one.doc) for name, one in every_kind().items()}),
         "campaign file": keys_table({"": campaign_file.TABLES[""]}),
         "campaign tables": keys_table({name: keys for name, keys in campaign_file.TABLES.items() if name}),
+        "drawn things": drawn_things(),
         "own robot": keys_table({name or "the file": keys for name, keys in robot_file.TABLES.items()}),
         "robot": lines(robots, "table"),
-        "fleet": lines({"": {**of_keys((*fleet_file.TOP, *fleet_file.ROBOT)), **plain(at)}}, ""),
+        "fleet": keys_table({"the file": fleet_file.TOP, "[[robot]]": fleet_file.ROBOT}),
+        "places": lines({"": plain(at)}, ""),
         "sensor errors": _one(sensor_errors.RANGES),
         "faults": _one(faults.VALUES),
         "flash": _one(flash.RANGES),

@@ -48,27 +48,40 @@ class FleetError(FileError):
 
 
 TOP = (
-    Key(name="world", kind="text", default="room"),
-    Key(name="body", kind="text", choices=BODY_CHOICES, group=BODY_GROUP, default=BEST),
-    Key(name="seed", kind="whole", least=0, most=2**63 - 1, default=0),
-    Key(name="apart", kind="flag", default=False),
-    Key(name="cross_talk", kind="flag", default=True),
-    Key(name="worlds", kind="text"),
-    Key(name="robot", kind="tables", required=True),
+    Key(name="world", kind="text", default="room", doc="a shipped world, or a file"),
+    Key(
+        name="body",
+        kind="text",
+        choices=BODY_CHOICES,
+        group=BODY_GROUP,
+        default=BEST,
+        doc="[which one](pioneer.md#bodies)",
+    ),
+    Key(name="seed", kind="whole", least=0, most=2**63 - 1, default=0, doc="of everything random"),
+    Key(name="apart", kind="flag", default=False, doc="each robot in its own copy of the world"),
+    Key(name="cross_talk", kind="flag", default=True, doc="a sonar hears other robots' pings"),
+    Key(name="worlds", kind="text", doc="a folder of worlds that clients may load"),
+    Key(name="robot", kind="tables", required=True, doc="a robot, or several alike"),
 )
 #: The upper ends are chosen.
 ROBOT = (
-    Key(name="count", kind="whole", least=1, most=MOST_ROBOTS, default=1),
-    Key(name="port", kind="text"),
-    Key(name="at", kind="list"),
-    Key(name="model", kind="text", default="p2dx"),
-    *(Key(name=name, kind="text") for name in ("for", "laser", "flash")),
-    Key(name="firmware", kind="text", choices=tuple(profile.value for profile in Profile)),
-    *(Key(name=name, kind="flag") for name in ("lenient", "all_sonar", "rear_sonar")),
-    Key(name="errors", kind="text", default="ideal"),
-    Key(name="baud", kind="whole", least=1, most=1_000_000),
-    *(Key(name=name, kind="texts", default=[]) for name in ("aux", "faults")),
-    Key(name="sync_limit_s", kind="number", least=1e-3, most=LONGEST_S),
+    Key(name="count", kind="whole", least=1, most=MOST_ROBOTS, default=1, doc="robots alike"),
+    Key(name="port", kind="text", doc="its URL"),
+    Key(name="at", kind="list", doc="x and y in metres, heading in degrees; default a free place"),
+    Key(name="model", kind="text", default="p2dx", doc="a robot model, or a file of one"),
+    *(
+        Key(name=name, kind="text", doc=doc)
+        for name, doc in (("for", "`aria`"), ("laser", "as `--laser`"), ("flash", "a FLASH file"))
+    ),
+    Key(name="firmware", kind="text", choices=tuple(profile.value for profile in Profile), doc="default the model's"),
+    *(Key(name=name, kind="flag", doc="as the option") for name in ("lenient", "all_sonar", "rear_sonar")),
+    Key(name="errors", kind="text", default="ideal", doc="[of sensors](pioneer.md#sensors-errors)"),
+    Key(name="baud", kind="whole", least=1, most=1_000_000, doc="a UART's speed"),
+    *(
+        Key(name=name, kind="texts", default=[], doc=doc)
+        for name, doc in (("aux", '`"1=URL"`'), ("faults", "[words](pioneer.md#faults)"))
+    ),
+    Key(name="sync_limit_s", kind="number", least=1e-3, most=LONGEST_S, doc="without an open session"),
 )
 #: A place: metres, metres, degrees.
 PLACE_RANGES = (WORLD_RANGES["x_m"], WORLD_RANGES["y_m"], WORLD_RANGES["heading_deg"])
