@@ -45,6 +45,6 @@ def _section(deck: Deck, figures: Mapping[str, float]) -> str:
         rows.append(f"| {limit.meaning} | {value} {limit.unit} | {low} … {high} |")
     table = "\n".join(["| figure | simulated | limits |", "| --- | --- | --- |", *rows])
     return (
-        f"\n## {deck.title}\n\n![Plot of {deck.name}](pictures/board/sim-{deck.name}.png)\n\n{table}\n\n"
+        f"\n## {deck.title}\n\n![{deck.name}](pictures/board/sim-{deck.name}.png)\n\n{table}\n\n"
         f"**Limits.** {deck.cannot_say}\n"
     )
