@@ -258,6 +258,7 @@ def instructions_page() -> str:
         "(UNDEFINSTR) is raised. LDR into the PC costs 3 more. Costs behind another load, and across lines of the",
         "flash, are [with the timing](core.md#time).",
         "",
+        "<!-- instructions -->",
         "| instruction | bits | cycles |",
         "| --- | --- | --- |",
     ]
@@ -265,7 +266,7 @@ def instructions_page() -> str:
         if row.operation != UNDEFINED:
             syntax = re.sub(r"<([^c])>", lambda found: f"R{found[1]}", row.syntax)
             lines.append(f"| {syntax.replace('|', ' ')} | `{_drawn(row)}` | {_cycles(row.kind)} |")
-    return "\n".join([*lines, ""])
+    return "\n".join([*lines, "<!-- end -->", ""])
 
 
 def _drawn(row: Encoding) -> str:

@@ -42,9 +42,9 @@ def _section(deck: Deck, figures: Mapping[str, float]) -> str:
     rows = []
     for limit in deck.limits:
         value, low, high = shown(figures[limit.measure]), shown(limit.low), shown(limit.high)
-        rows.append(f"| {limit.meaning} | {value} {limit.unit} | {low} to {high} |")
+        rows.append(f"| {limit.meaning} | {value} {limit.unit} | {low} … {high} |")
     table = "\n".join(["| figure | simulated | limits |", "| --- | --- | --- |", *rows])
     return (
-        f"\n## {deck.title}\n\n![Plot of {deck.name}](pictures/board/sim-{deck.name}.png)\n\n{table}\n\n"
+        f"\n## {deck.title}\n\n![{deck.name}](pictures/board/sim-{deck.name}.png)\n\n{table}\n\n"
         f"**Limits.** {deck.cannot_say}\n"
     )
