@@ -5,6 +5,7 @@ import typer
 from bluepill_sim.cli import coverage, debug, info, parts, pins, profile, run, trace
 from bluepill_sim.cli.browser import page
 from bluepill_sim.cli.comparisons import compare_cores, compare_silicon, races
+from simbase.command_line.help_pages import VerbPage
 
 HELP = """Run, inspect and debug a BluePill program, without a robot.
 
@@ -30,4 +31,5 @@ def add_verbs(app: typer.Typer) -> None:
     modules = (run, parts, debug, info, pins, trace, coverage, profile, races, compare_silicon, compare_cores, page)
     for module in modules:
         name = module.__name__.rpartition(".")[2]
-        app.command(name.replace("_", "-"), help=module.HELP)(getattr(module, name))
+        page_class = getattr(module, "PAGE", VerbPage)
+        app.command(name.replace("_", "-"), help=module.HELP, cls=page_class)(getattr(module, name))

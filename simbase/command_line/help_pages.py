@@ -6,6 +6,8 @@
 
 import inspect
 import re
+from collections.abc import Callable, Mapping, Sequence
+from typing import ClassVar
 
 import typer
 from typer.core import TyperCommand, TyperGroup
@@ -18,8 +20,24 @@ OTHERS = "Others"
 _COLUMNS = re.compile(r"^(?P<left> *\S+(?: \S+)*)  +(?P<right>\S.*)$")
 
 
+#: What an option is given that stands without a value, seen from the word behind it; nothing where that is its value.
+Usual = Callable[[str], Sequence[str]]
+
+
 class VerbPage(TyperCommand):
     """The page of a verb."""
+
+    #: Options that may stand without a value.
+    usual: ClassVar[Mapping[str, Usual]] = {}
+
+    def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:  # type: ignore[override]  # typer's own class
+        """Insert values that are usual."""
+        filled = []
+        for word, following in zip(args, [*args[1:], ""], strict=True):
+            filled.append(word)
+            if word in self.usual:
+                filled += self.usual[word](following)
+        return super().parse_args(ctx, filled)
 
     def format_help_text(self, ctx: typer.Context, formatter) -> None:  # type: ignore[no-untyped-def, override]  # noqa: ANN001 - click's or typer's own
         """Write what the help says, no line wider than the page."""
