@@ -33,7 +33,7 @@ class VerbPage(TyperCommand):
     def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:  # type: ignore[override]  # typer's own class
         """Insert values that are usual."""
         filled = []
-        for word, following in zip(args, [*args[1:], ""], strict=True):
+        for word, following in zip(args, [*args, ""][1:], strict=True):
             filled.append(word)
             if word in self.usual:
                 filled += self.usual[word](following)
