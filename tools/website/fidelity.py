@@ -17,7 +17,11 @@ from tests.bluepill_sim.peripherals.sequences.table import ROWS
 ROOT = Path(__file__).resolve().parents[2]
 SECTION = re.compile(r"^## (?P<title>.+?)$(?P<text>.*?)(?=^## |\Z)", re.MULTILINE | re.DOTALL)
 #: What begins a list of statements in docs/peripherals.md.
-MARK = re.compile(r"\*{0,2}\b(?P<kind>Modelled|Chosen|Not modelled)\b(?P<more>[^:.*\n]{0,30})\*{0,2}:", re.IGNORECASE)
+MARK = re.compile(
+    r"\*{0,2}\b(?P<kind>Modelled|Chosen|Not modelled)\b\*{0,2}(?P<more>[^:.*\n]{0,40})\*{0,2}:", re.IGNORECASE
+)
+#: What a paragraph or an item of a list begins behind.
+APART = re.compile(r"\n\s*\n|\n(?=- )")
 INSTANCE = re.compile(r"\(.*|,.*| to .*| and .*|\d+$")
 #: Sources of a robot's numbers, as its file's comments name them.
 SOURCES = ("ARIA", "player", "MobileSim", "manual", "RosAria", "AMRISim")
@@ -62,14 +66,24 @@ def models(text: str) -> Iterator[Model]:
     """Yield the models of the page of data sheets that say what they model."""
     for section in SECTION.finditer(text):
         said: dict[str, list[str]] = {"chosen": [], "not modelled": []}
-        marks = list(MARK.finditer(section["text"]))
-        if not marks:
+        if not MARK.search(section["text"]):
             continue
-        for mark, end in zip(marks, [*(one.start() for one in marks[1:]), len(section["text"])], strict=True):
-            told = said.get(mark["kind"].lower())
-            if told is not None:
-                words = f"{mark['more'].strip(' ,')}: " if mark["more"].strip(" ,") else ""
-                told += [words + one for one in statements(section["text"][mark.end() : end])]
+        kept: list[str] | None = None  # of a mark at the end of its paragraph: what the list below it says
+        before = ""
+        for block in APART.split(section["text"].strip()):
+            marks = list(MARK.finditer(block))
+            if kept is not None and not marks and block.startswith("- "):
+                kept += [before + one for one in statements(block.removeprefix("- "))]
+                continue
+            kept = None
+            ends = [*(one.start() for one in marks), len(block)][1:]
+            for mark, end in zip(marks, ends, strict=True):
+                of_kind = said.get(mark["kind"].lower())
+                before = f"{mark['more'].strip(' ,')}: " if mark["more"].strip(" ,") else ""
+                text_behind = block[mark.end() : end]
+                if of_kind is not None:
+                    of_kind += [before + one for one in statements(text_behind)]
+                kept = None if text_behind.strip() else of_kind
         title = section["title"].partition(" (")[0]
         yield Model(title, slug(section["title"]), tuple(said["chosen"]), tuple(said["not modelled"]))
 
