@@ -18,7 +18,6 @@ ROOT = Path(__file__).resolve().parents[2]
 SECTION = re.compile(r"^## (?P<title>.+?)$(?P<text>.*?)(?=^## |\Z)", re.MULTILINE | re.DOTALL)
 #: What begins a list of statements in docs/peripherals.md.
 MARK = re.compile(r"\*{0,2}\b(?P<kind>Modelled|Chosen|Not modelled)\b(?P<more>[^:.*\n]{0,30})\*{0,2}:", re.IGNORECASE)
-INSTANCE = re.compile(r"\(.*|,.*| to .*| and .*|\d+$")
 #: Sources of a robot's numbers, as its file's comments name them.
 SOURCES = ("ARIA", "player", "MobileSim", "manual", "RosAria", "AMRISim")
 _HEAD = """# Fidelity
@@ -33,7 +32,7 @@ drive the robot stand in [foreign programs](foreign.md), and [validation](valida
 
 ## Peripherals
 
-| peripheral | chosen | not modelled | drivers' rows held | seen on silicon | the kit compares |
+| peripheral, as modelled | chosen | not modelled | drivers' rows held | seen on silicon | the kit compares |
 |---|---|---|---|---|---|
 """
 _ROBOTS = """
@@ -101,9 +100,8 @@ def silicon() -> dict[str, tuple[str, str]]:
 
 
 def family(title: str) -> set[str]:
-    """Return the names of the peripherals that a title is about, without their numbers: {"USART"} of "USART1 to 3"."""
-    names = re.findall(r"[A-Za-z]+", re.sub(r"\bto\b|\band\b", " ", title.replace("bxCAN", "CAN").replace("1, ", " ")))
-    return {re.sub(r"\d+$", "", name).upper() for name in names}
+    """Return the kinds of peripherals that a title is about: {"USART"} of "USART1 to USART3", {"CAN"} of "bxCAN"."""
+    return {re.sub(r"^BX|\d+$|(?<=^GPIO)[A-E]$", "", name) for name in re.findall(r"[A-Z][A-Z0-9]+", title.upper())}
 
 
 def page() -> str:
@@ -113,7 +111,7 @@ def page() -> str:
     measured = silicon()
     lines, details = [], []
     for model in models((ROOT / "docs" / "peripherals.md").read_text(encoding="utf-8")):
-        names = {re.sub(r"A$", "", name) if name == "GPIOA" else name for name in family(model.title)}
+        names = family(model.title)
         rows = sum(asked[name] for name in names)
         shown, kit = next((value for name, value in measured.items() if names & family(name)), ("nothing", "no"))
         drivers = f"{sum(held[name] for name in names)} of {rows}" if rows else "no rows"
@@ -121,7 +119,7 @@ def page() -> str:
         cells = (first, _count(model.chosen, model), f"{len(model.not_modelled)}", drivers, shown, kit)
         lines.append(f"| {' | '.join(cells)} |")
         if model.chosen or model.not_modelled:
-            details += [f"### {model.title}: chosen, not modelled", ""]
+            details += [f"### {model.title}", ""]
             details += [f"- *chosen*: {one}" for one in model.chosen]
             details += [f"- *not modelled*: {one}" for one in model.not_modelled]
             details.append("")
@@ -130,7 +128,7 @@ def page() -> str:
 
 
 def _count(said: tuple[str, ...], model: Model) -> str:
-    return f"[{len(said)}](#{slug(f'{model.title}: chosen, not modelled')})" if said else "0"
+    return f"[{len(said)}](#{slug(model.title)})" if said else "0"
 
 
 def robots() -> Iterator[str]:
