@@ -42,8 +42,8 @@ Each number of a robot's file has its source beside it; `chosen` counts those th
 none. [The virtual Pioneer](pioneer.md) has the controller's data sheet, and [validation](validation.md) lays it beside
 a simulator of others.
 
-| robot | file | controller | sources named | chosen |
-|---|---|---|---|---|
+| robot | file | based on | controller | sources named | chosen |
+|---|---|---|---|---|---|
 """
 
 
@@ -132,12 +132,16 @@ def _count(said: tuple[str, ...], model: Model) -> str:
 
 
 def robots() -> Iterator[str]:
-    """Yield a row for each robot's file."""
-    for path in sorted((ROOT / "p2os" / "robots").glob("*.toml")):
-        text = path.read_text(encoding="utf-8")
-        found = tomllib.loads(text)
-        comments = "\n".join(re.findall(r"#(.*)$", text, re.MULTILINE))
+    """Yield a row for each robot's file; what it leaves out is that of the file that it is based on."""
+    folder = ROOT / "p2os" / "robots"
+    for path in sorted(folder.glob("*.toml")):
+        texts = [path.read_text(encoding="utf-8")]
+        while base := tomllib.loads(texts[-1]).get("based_on"):
+            texts.append((folder / f"{base}.toml").read_text(encoding="utf-8"))
+        found = [tomllib.loads(text) for text in texts]
+        firmware = next(one["firmware"] for one in found if "firmware" in one)
+        comments = "\n".join(re.findall(r"#(.*)$", "\n".join(texts), re.MULTILINE))
         named = [one for one in SOURCES if one.lower() in comments.lower()]
-        chosen = len(re.findall(r"\bchosen\b", comments.partition("\n\n")[0] and comments)) - ("nobody agrees" in text)
-        yield (f"| {found.get('title', path.stem)} | `{path.name}` | {', '.join(found.get('firmware', []))} "
-               f"| {', '.join(named) or 'those of its parent'} | {max(chosen, 0)} |")  # fmt: skip
+        chosen = len(re.findall(r"^ chosen\b", comments, re.MULTILINE))
+        cells = (found[0]["title"], f"`{path.name}`", f"{found[0].get('based_on', '')}", ", ".join(firmware))
+        yield f"| {' | '.join((*cells, ', '.join(named), str(chosen)))} |"
