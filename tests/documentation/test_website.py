@@ -75,10 +75,11 @@ def test_the_page_of_fidelity_has_every_peripheral_and_robot() -> None:
     models = list(fidelity.models((ROOT / "docs/peripherals.md").read_text(encoding="utf-8")))
     assert len(models) >= 20
     assert sum(bool(model.chosen) for model in models) >= 15
-    assert all(f"| [{model.title}](peripherals.md#{model.anchor}) |" in page for model in models)
+    assert all(f"| {model.title} | [{model.modelled}](peripherals.md#{model.anchor}) |" in page for model in models)
+    assert all(model.modelled for model in models)
     assert all(f"`{path.name}`" in page for path in (ROOT / "p2os/robots").glob("*.toml"))
     asked = sum(row.peripheral == "I2C" for row in ROWS)
-    assert re.search(rf"^\| \[I2C1 and I2C2\].* \| \d+ of {asked} \| nothing \| registers \|", page, re.MULTILINE)
+    assert re.search(rf"^\| I2C1 and I2C2 \|.* \| \d+ of {asked} \| nothing \| registers \|", page, re.MULTILINE)
 
 
 @pytest.mark.parametrize(
@@ -90,9 +91,26 @@ def test_a_title_is_of_its_peripheral_whatever_its_number(title: str, names: set
 
 
 def test_statements_are_parted_where_they_end_and_not_in_brackets() -> None:
-    text = "## X (`x.py`)\nModelled: a.\n*Chosen*: one (by 1.5; see 2); two.\nNot modelled: three. Four\n\n- more\n"
+    text = """## X
+
+`peripherals/x.py`; RM0008 1.
+
+- **A** is (*chosen*: zero (or so)).
+- B.
+- *Chosen*: one (by 1.5; see 2); two.
+- Not modelled, with a warning: three. Four
+  goes on.
+
+*Chosen* for reception: five.
+
+## No peripheral
+
+- *Chosen*: six.
+"""
     (model,) = fidelity.models(text)
-    assert (model.title, model.chosen, model.not_modelled) == ("X", ("one (by 1.5; see 2)", "two"), ("three", "Four"))
+    assert (model.title, model.modelled) == ("X", 2)
+    assert model.chosen == ("zero (or so)", "one (by 1.5; see 2)", "two", "for reception: five")
+    assert model.not_modelled == ("with a warning: three", "with a warning: Four goes on")
 
 
 def test_the_gallery_has_each_picture_that_a_page_shows() -> None:

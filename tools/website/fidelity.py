@@ -16,8 +16,10 @@ from tests.bluepill_sim.peripherals.sequences.table import ROWS
 
 ROOT = Path(__file__).resolve().parents[2]
 SECTION = re.compile(r"^## (?P<title>.+?)$(?P<text>.*?)(?=^## |\Z)", re.MULTILINE | re.DOTALL)
-#: What begins a list of statements in docs/peripherals.md.
-MARK = re.compile(r"\*{0,2}\b(?P<kind>Modelled|Chosen|Not modelled)\b(?P<more>[^:.*\n]{0,30})\*{0,2}:", re.IGNORECASE)
+#: What begins a paragraph or an item of a list that says more than what is modelled.
+MARK = re.compile(r"\*?(?P<kind>chosen|not modelled)\*?(?P<more>[^:.*]{0,40}):\s*", re.IGNORECASE)
+#: A choice within a sentence.
+ASIDE = re.compile(r"\(\*chosen\*: (?P<said>[^()]*(?:\([^()]*\)[^()]*)*)\)")
 #: Sources of a robot's numbers, as its file's comments name them.
 SOURCES = ("ARIA", "player", "MobileSim", "manual", "RosAria", "AMRISim")
 _HEAD = """# Fidelity
@@ -32,8 +34,10 @@ drive the robot stand in [foreign programs](foreign.md), and [validation](valida
 
 ## Peripherals
 
-| peripheral, as modelled | chosen | not modelled | drivers' rows held | seen on silicon | the kit compares |
-|---|---|---|---|---|---|
+Figures count statements of the data sheets; each leads to what they say.
+
+| peripheral | modelled | chosen | not modelled | drivers' rows held | seen on silicon | the kit compares |
+|---|---|---|---|---|---|---|
 """
 _ROBOTS = """
 ## Robots
@@ -53,29 +57,33 @@ class Model:
 
     title: str
     anchor: str
+    modelled: int  # items that say what it does
     chosen: tuple[str, ...]
     not_modelled: tuple[str, ...]
 
 
 def models(text: str) -> Iterator[Model]:
-    """Yield the models of the page of data sheets that say what they model."""
+    """Yield the models of the page of data sheets: its sections that name a source file of a peripheral."""
     for section in SECTION.finditer(text):
         said: dict[str, list[str]] = {"chosen": [], "not modelled": []}
-        marks = list(MARK.finditer(section["text"]))
-        if not marks:
+        modelled = 0
+        about, *items = re.split(r"\n\s*\n|\n(?=- )", section["text"].strip())
+        if not re.match(r"`(?:peripherals|fabric)/", about):
             continue
-        for mark, end in zip(marks, [*(one.start() for one in marks[1:]), len(section["text"])], strict=True):
-            told = said.get(mark["kind"].lower())
-            if told is not None:
-                words = f"{mark['more'].strip(' ,')}: " if mark["more"].strip(" ,") else ""
-                told += [words + one for one in statements(section["text"][mark.end() : end])]
-        title = section["title"].partition(" (")[0]
-        yield Model(title, slug(section["title"]), tuple(said["chosen"]), tuple(said["not modelled"]))
+        for item in items:
+            words = " ".join(item.removeprefix("- ").split())
+            said["chosen"] += [aside["said"] for aside in ASIDE.finditer(words)]
+            if mark := MARK.match(words):
+                more = f"{mark['more'].strip(' ,')}: " if mark["more"].strip(" ,") else ""
+                said[mark["kind"].lower()] += [more + one for one in statements(words[mark.end() :])]
+            else:
+                modelled += item.startswith("- ")
+        title = section["title"]
+        yield Model(title, slug(title), modelled, tuple(said["chosen"]), tuple(said["not modelled"]))
 
 
 def statements(text: str) -> list[str]:
     """Return the statements of a paragraph: what semicolons and full stops part, outside of brackets."""
-    text = " ".join(re.split(r"\n\s*\n", text.strip(), maxsplit=1)[0].split()).rstrip("*").strip()
     parts, depth, start = [], 0, 0
     for at, sign in enumerate(text):
         depth += (sign == "(") - (sign == ")")
@@ -115,8 +123,9 @@ def page() -> str:
         rows = sum(asked[name] for name in names)
         shown, kit = next((value for name, value in measured.items() if names & family(name)), ("nothing", "no"))
         drivers = f"{sum(held[name] for name in names)} of {rows}" if rows else "no rows"
-        first = f"[{model.title}](peripherals.md#{model.anchor})"
-        cells = (first, _count(model.chosen, model), f"{len(model.not_modelled)}", drivers, shown, kit)
+        modelled = f"[{model.modelled}](peripherals.md#{model.anchor})"
+        counts = (_count(said, model) for said in (model.chosen, model.not_modelled))
+        cells = (model.title, modelled, *counts, drivers, shown, kit)
         lines.append(f"| {' | '.join(cells)} |")
         if model.chosen or model.not_modelled:
             details += [f"### {model.title}", ""]
