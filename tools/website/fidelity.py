@@ -52,7 +52,7 @@ a simulator of others.
 
 
 @dataclass(frozen=True, slots=True)
-class Model:
+class DataSheet:
     """What docs/peripherals.md says of a model."""
 
     title: str
@@ -62,7 +62,7 @@ class Model:
     not_modelled: tuple[str, ...]
 
 
-def models(text: str) -> Iterator[Model]:
+def models(text: str) -> Iterator[DataSheet]:
     """Yield the models of the page of data sheets: its sections that name a source file of a peripheral."""
     for section in SECTION.finditer(text):
         said: dict[str, list[str]] = {"chosen": [], "not modelled": []}
@@ -79,7 +79,7 @@ def models(text: str) -> Iterator[Model]:
             else:
                 modelled += item.startswith("- ")
         title = section["title"]
-        yield Model(title, slug(title), modelled, tuple(said["chosen"]), tuple(said["not modelled"]))
+        yield DataSheet(title, slug(title), modelled, tuple(said["chosen"]), tuple(said["not modelled"]))
 
 
 def statements(text: str) -> list[str]:
@@ -136,7 +136,7 @@ def page() -> str:
     return "".join(parts) + "\n".join(details)
 
 
-def _count(said: tuple[str, ...], model: Model) -> str:
+def _count(said: tuple[str, ...], model: DataSheet) -> str:
     return f"[{len(said)}](#{slug(model.title)})" if said else "0"
 
 
