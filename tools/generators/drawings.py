@@ -14,7 +14,7 @@ from p2os.protocol.bauds import DEFAULT_BAUD
 
 FOLDER = Path(__file__).resolve().parents[2] / "docs" / "pictures" / "concepts"
 #: Pixels: a column and a row of the grid that boxes stand on, and a box.
-COLUMN, ROW, WIDTH, HEIGHT = 200, 108, 150, 64
+COLUMN, ROW, WIDTH, HEIGHT = 252, 108, 172, 64
 MARGIN = 24
 #: Fill and rim of a kind of box.
 FILLS = {"yours": ("#fff3d6", "#b7791f"), "part": ("#e3effb", "#2b6cb0"), "result": ("#e2f4e6", "#2f855a")}

@@ -106,4 +106,5 @@ def _declared(member: doc.Doc[object]) -> str:
 def _text(member: doc.Doc[object]) -> str:
     """Return a docstring as Markdown, the headings of its sections as lines in bold: contents stay short."""
     text = docstrings.convert(member.docstring, "google", member.source_file)
-    return "\n".join(f"**{line.lstrip('#').strip()}**" if line.startswith("#") else line for line in text.splitlines())
+    bold = (f"\n**{line.lstrip('#').strip()}**\n" if line.startswith("#") else line for line in text.splitlines())
+    return "\n".join(bold)
