@@ -149,7 +149,9 @@ def _arrow(arrow: Arrow, boxes: dict[str, LabelledBox]) -> Iterator[str]:
     if arrow.text:
         is_upright = abs(x1 - x2) < COLUMN / 2
         x, y = (a + c) / 2, (b + d) / 2
-        where = f'x="{x + 8:g}" y="{y + 4:g}" text-anchor="start"' if is_upright else f'x="{x:g}" y="{y - 8:g}"'
+        where = f'x="{x:g}" y="{y - 8:g}"' if y1 == y2 else f'x="{x - 10:g}" y="{y + 14:g}" text-anchor="end"'
+        if is_upright:
+            where = f'x="{x + 8:g}" y="{y + 4:g}" text-anchor="start"'
         yield f'<text {where} font-size="11" fill="#4a5568">{escape(arrow.text)}</text>'
 
 
