@@ -7,6 +7,7 @@
 import inspect
 import re
 from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
 from typing import ClassVar
 
 import typer
@@ -33,7 +34,7 @@ class VerbPage(TyperCommand):
     def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:  # type: ignore[override]  # typer's own class
         """Insert values that are usual."""
         filled = []
-        for word, following in zip(args, [*args, ""][1:], strict=True):
+        for word, following in pairwise([*args, ""]):
             filled.append(word)
             if word in self.usual:
                 filled += self.usual[word](following)

@@ -67,7 +67,8 @@ def test_the_pages_of_the_api_are_made_without_a_warning_and_every_public_name_i
     made, wrong = api.pages()
     assert wrong == []
     page = made["reference/api/robot_bench.md"]
-    assert all(f"#Bench.{name} }}" in page for name in ("from_scenario", "run_until", "pose", "level", "text", "judge"))
+    assert all(f"#Bench.{name} }}" in page for name in ("from_scenario", "run_until", "level", "judge"))
+    assert all(f"\n- `{name}: " in page for name in ("pose", "text"))
     assert {f"reference/api/{package}.md" for package in PACKAGES} <= made.keys()
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from tests.bluepill_sim.peripherals.sequences.table import ROWS
 from tests.documentation.command_lines import command_line
 from tests.documentation.page import ROOT
 from tools.website import fidelity, gallery, judging, reference
@@ -74,15 +75,42 @@ def test_the_page_of_fidelity_has_every_peripheral_and_robot() -> None:
     models = list(fidelity.models((ROOT / "docs/peripherals.md").read_text(encoding="utf-8")))
     assert len(models) >= 20
     assert sum(bool(model.chosen) for model in models) >= 15
-    assert all(f"| [{model.title}](peripherals.md#{model.anchor}) |" in page for model in models)
+    assert all(f"| {model.title} | [{model.modelled}](peripherals.md#{model.anchor}) |" in page for model in models)
+    assert all(model.modelled for model in models)
     assert all(f"`{path.name}`" in page for path in (ROOT / "p2os/robots").glob("*.toml"))
-    assert re.search(r"^\| \[USART1 to USART3\].* \| 26 of 28 \| ", page, re.MULTILINE)
+    asked = sum(row.peripheral == "I2C" for row in ROWS)
+    assert re.search(rf"^\| I2C1 and I2C2 \|.* \| \d+ of {asked} \| nothing \| registers \|", page, re.MULTILINE)
+
+
+@pytest.mark.parametrize(
+    ("title", "names"),
+    [("USART1 to USART3", {"USART"}), ("I2C1 and I2C2", {"I2C"}), ("bxCAN", {"CAN"}), ("GPIOA to GPIOE", {"GPIO"})],
+)
+def test_a_title_is_of_its_peripheral_whatever_its_number(title: str, names: set[str]) -> None:
+    assert fidelity.family(title) - {"TO", "AND"} == names
 
 
 def test_statements_are_parted_where_they_end_and_not_in_brackets() -> None:
-    text = "## X (`x.py`)\nModelled: a.\n*Chosen*: one (by 1.5; see 2); two.\nNot modelled: three. Four\n\n- more\n"
+    text = """## X
+
+`peripherals/x.py`; RM0008 1.
+
+- **A** is (*chosen*: zero (or so)).
+- B.
+- *Chosen*: one (by 1.5; see 2); two.
+- Not modelled, with a warning: three. Four
+  goes on.
+
+*Chosen* for reception: five.
+
+## No peripheral
+
+- *Chosen*: six.
+"""
     (model,) = fidelity.models(text)
-    assert (model.title, model.chosen, model.not_modelled) == ("X", ("one (by 1.5; see 2)", "two"), ("three", "Four"))
+    assert (model.title, model.modelled) == ("X", 2)
+    assert model.chosen == ("zero (or so)", "one (by 1.5; see 2)", "two", "for reception: five")
+    assert model.not_modelled == ("with a warning: three", "with a warning: Four goes on")
 
 
 def test_statements_of_a_list_are_those_of_its_item_or_of_the_mark_before_it() -> None:

@@ -14,14 +14,14 @@ from p2os.protocol.bauds import DEFAULT_BAUD
 
 FOLDER = Path(__file__).resolve().parents[2] / "docs" / "pictures" / "concepts"
 #: Pixels: a column and a row of the grid that boxes stand on, and a box.
-COLUMN, ROW, WIDTH, HEIGHT = 200, 108, 150, 64
+COLUMN, ROW, WIDTH, HEIGHT = 252, 108, 172, 64
 MARGIN = 24
 #: Fill and rim of a kind of box.
 FILLS = {"yours": ("#fff3d6", "#b7791f"), "part": ("#e3effb", "#2b6cb0"), "result": ("#e2f4e6", "#2f855a")}
 
 
 @dataclass(frozen=True, slots=True)
-class Box:
+class LabelledBox:
     """A box on the grid: its lines, the first of them in bold."""
 
     column: float
@@ -50,7 +50,7 @@ class Drawing:
     """A drawing: boxes by name, and the arrows between them."""
 
     title: str
-    boxes: dict[str, Box]
+    boxes: dict[str, LabelledBox]
     arrows: tuple[Arrow, ...]
 
 
@@ -60,12 +60,12 @@ def drawings() -> dict[str, Drawing]:
     chain = Drawing(
         "From your binary to the wheels",
         {
-            "binary": Box(0, 0, ("your binary", "ELF, HEX or BIN"), "yours"),
-            "board": Box(0, 1, ("BluePill", "emulated STM32F103")),
-            "adapter": Box(1, 1, ("adapter", "pins to velocities")),
-            "robot": Box(2, 1, ("Pioneer", "its controller")),
-            "body": Box(3, 1, ("body and world", "wheels, sonar, walls")),
-            "real": Box(2, 2, ("a real Pioneer", "--port serial:…"), "yours"),
+            "binary": LabelledBox(0, 0, ("your binary", "ELF, HEX or BIN"), "yours"),
+            "board": LabelledBox(0, 1, ("BluePill", "emulated STM32F103")),
+            "adapter": LabelledBox(1, 1, ("adapter", "pins to velocities")),
+            "robot": LabelledBox(2, 1, ("Pioneer", "its controller")),
+            "body": LabelledBox(3, 1, ("body and world", "wheels, sonar, walls")),
+            "real": LabelledBox(2, 2, ("a real Pioneer", "--port serial:…"), "yours"),
         },
         (
             Arrow("binary", "board", "boots"),
@@ -78,12 +78,12 @@ def drawings() -> dict[str, Drawing]:
     time = Drawing(
         "One clock that is counted, not read",
         {
-            "queue": Box(1, 0, ("virtual time", "nanoseconds, an integer")),
-            "board": Box(0, 1, ("board", "advance to t")),
-            "adapter": Box(1, 1, ("adapter", "advance to t")),
-            "robot": Box(2, 1, ("robot and body", "advance to t")),
-            "trace": Box(1, 2, ("trace", "every event with its t"), "result"),
-            "hash": Box(2, 2, ("hash", "same input, same hash"), "result"),
+            "queue": LabelledBox(1, 0, ("virtual time", "nanoseconds, an integer")),
+            "board": LabelledBox(0, 1, ("board", "advance to t")),
+            "adapter": LabelledBox(1, 1, ("adapter", "advance to t")),
+            "robot": LabelledBox(2, 1, ("robot and body", "advance to t")),
+            "trace": LabelledBox(1, 2, ("trace", "every event with its t"), "result"),
+            "hash": LabelledBox(2, 2, ("hash", "same input, same hash"), "result"),
         },
         (
             Arrow("queue", "board"), Arrow("queue", "adapter", "next event"), Arrow("queue", "robot"),
@@ -93,14 +93,14 @@ def drawings() -> dict[str, Drawing]:
     verdict = Drawing(
         "From a scenario to a verdict",
         {
-            "scenario": Box(0, 0, ("scenario", "world, goals, faults"), "yours"),
-            "binary": Box(0, 1, ("binary", "the one that you flash"), "yours"),
-            "seed": Box(0, 2, ("seed", "every random draw"), "yours"),
-            "run": Box(1, 1, ("run", "p2os run")),
-            "goals": Box(2, 0, ("goals", "judged as it goes")),
-            "folder": Box(2, 2, ("run folder", "trace, VCD, report"), "result"),
-            "verdict": Box(3, 0, ("verdict", "exit code 0 or 1"), "result"),
-            "replay": Box(3, 2, ("replay line", "the same run again"), "result"),
+            "scenario": LabelledBox(0, 0, ("scenario", "world, goals, faults"), "yours"),
+            "binary": LabelledBox(0, 1, ("binary", "the one that you flash"), "yours"),
+            "seed": LabelledBox(0, 2, ("seed", "every random draw"), "yours"),
+            "run": LabelledBox(1, 1, ("run", "p2os run")),
+            "goals": LabelledBox(2, 0, ("goals", "judged as it goes")),
+            "folder": LabelledBox(2, 2, ("run folder", "trace, VCD, report"), "result"),
+            "verdict": LabelledBox(3, 0, ("verdict", "exit code 0 or 1"), "result"),
+            "replay": LabelledBox(3, 2, ("replay line", "the same run again"), "result"),
         },
         (
             Arrow("scenario", "run"), Arrow("binary", "run"), Arrow("seed", "run"), Arrow("run", "goals"),
@@ -129,7 +129,7 @@ def svg(drawing: Drawing) -> str:
     return "\n".join(parts) + "\n"
 
 
-def _box(box: Box) -> Iterator[str]:
+def _box(box: LabelledBox) -> Iterator[str]:
     fill, rim = FILLS[box.kind]
     x, y = box.middle
     yield (f'<rect x="{x - WIDTH / 2:g}" y="{y - HEIGHT / 2:g}" width="{WIDTH}" height="{HEIGHT}" rx="8" '
@@ -139,7 +139,7 @@ def _box(box: Box) -> Iterator[str]:
         yield f'<text x="{x:g}" y="{y - 4 + 20 * number:g}" {style}>{escape(line)}</text>'
 
 
-def _arrow(arrow: Arrow, boxes: dict[str, Box]) -> Iterator[str]:
+def _arrow(arrow: Arrow, boxes: dict[str, LabelledBox]) -> Iterator[str]:
     (x1, y1), (x2, y2) = boxes[arrow.first].middle, boxes[arrow.second].middle
     ends = _edge(x1, y1, x2, y2), _edge(x2, y2, x1, y1)
     (a, b), (c, d) = ends
@@ -149,7 +149,9 @@ def _arrow(arrow: Arrow, boxes: dict[str, Box]) -> Iterator[str]:
     if arrow.text:
         is_upright = abs(x1 - x2) < COLUMN / 2
         x, y = (a + c) / 2, (b + d) / 2
-        where = f'x="{x + 8:g}" y="{y + 4:g}" text-anchor="start"' if is_upright else f'x="{x:g}" y="{y - 8:g}"'
+        where = f'x="{x:g}" y="{y - 8:g}"' if y1 == y2 else f'x="{x - 10:g}" y="{y + 14:g}" text-anchor="end"'
+        if is_upright:
+            where = f'x="{x + 8:g}" y="{y + 4:g}" text-anchor="start"'
         yield f'<text {where} font-size="11" fill="#4a5568">{escape(arrow.text)}</text>'
 
 

@@ -22,7 +22,9 @@ def undocumented(namespace: doc.Namespace[object]) -> Iterator[str]:
     """Yield the full names of public modules, classes and functions without a docstring."""
     if not namespace.docstring:
         yield namespace.fullname
-    for member in public(namespace):
+    for member in namespace.own_members:
+        if member.name.startswith("_"):
+            continue
         if isinstance(member, doc.Class):
             yield from undocumented(member)
         elif isinstance(member, doc.Function) and not member.docstring:
@@ -30,8 +32,13 @@ def undocumented(namespace: doc.Namespace[object]) -> Iterator[str]:
 
 
 def public(namespace: doc.Namespace[object]) -> list[doc.Doc[object]]:
-    """Return the members that a program may use."""
-    return [member for member in namespace.own_members if not member.name.startswith("_")]
+    """Return the members that a program may use, those of a class that come from bases of ours among them."""
+    held = list(namespace.own_members)
+    if isinstance(namespace, doc.Class):
+        ours = {name.partition(".")[0] for name in MODULES}
+        bases = namespace.inherited_members.items()
+        held += [one for (module, _), members in bases if module.partition(".")[0] in ours for one in members]
+    return [member for member in held if not member.name.startswith("_")]
 
 
 def pages(names: tuple[str, ...] = MODULES) -> tuple[dict[str, str], list[str]]:
@@ -56,9 +63,20 @@ def pages(names: tuple[str, ...] = MODULES) -> tuple[dict[str, str], list[str]]:
 def page(module: doc.Module) -> str:
     """Return the page of a module."""
     parts = [f"# {module.fullname}", _text(module)]
-    for member in public(module):
-        parts += _described(member, 2)
+    parts += _members(module, 2)
     return "\n\n".join(parts) + "\n"
+
+
+def _members(namespace: doc.Namespace[object], level: int) -> Iterator[str]:
+    """Yield what a module or class holds: constants and fields in a list, and a heading for each other member."""
+    held = public(namespace)
+    if fields := [member for member in held if isinstance(member, doc.Variable)]:
+        yield "\n".join(
+            f"- `{_declared(one)}`{': ' + ' '.join(_text(one).split()) if one.docstring else ''}" for one in fields
+        )
+    for member in held:
+        if not isinstance(member, doc.Variable):
+            yield from _described(member, level)
 
 
 def _described(member: doc.Doc[object], level: int) -> Iterator[str]:
@@ -67,8 +85,7 @@ def _described(member: doc.Doc[object], level: int) -> Iterator[str]:
     if member.docstring:
         yield _text(member)
     if isinstance(member, doc.Class):
-        for below in public(member):
-            yield from _described(below, level + 1)
+        yield from _members(member, level + 1)
 
 
 def _anchor(member: doc.Doc[object]) -> str:
@@ -89,4 +106,5 @@ def _declared(member: doc.Doc[object]) -> str:
 def _text(member: doc.Doc[object]) -> str:
     """Return a docstring as Markdown, the headings of its sections as lines in bold: contents stay short."""
     text = docstrings.convert(member.docstring, "google", member.source_file)
-    return "\n".join(f"**{line.lstrip('#').strip()}**" if line.startswith("#") else line for line in text.splitlines())
+    bold = (f"\n**{line.lstrip('#').strip()}**\n" if line.startswith("#") else line for line in text.splitlines())
+    return "\n".join(bold)

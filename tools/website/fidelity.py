@@ -16,13 +16,10 @@ from tests.bluepill_sim.peripherals.sequences.table import ROWS
 
 ROOT = Path(__file__).resolve().parents[2]
 SECTION = re.compile(r"^## (?P<title>.+?)$(?P<text>.*?)(?=^## |\Z)", re.MULTILINE | re.DOTALL)
-#: What begins a list of statements in docs/peripherals.md.
-MARK = re.compile(
-    r"\*{0,2}\b(?P<kind>Modelled|Chosen|Not modelled)\b\*{0,2}(?P<more>[^:.*\n]{0,40})\*{0,2}:", re.IGNORECASE
-)
-#: What a paragraph or an item of a list begins behind.
-APART = re.compile(r"\n\s*\n|\n(?=- )")
-INSTANCE = re.compile(r"\(.*|,.*| to .*| and .*|\d+$")
+#: What begins a paragraph or an item of a list that says more than what is modelled.
+MARK = re.compile(r"\*?(?P<kind>chosen|not modelled)\*?(?P<more>[^:.*]{0,40}):\s*", re.IGNORECASE)
+#: A choice within a sentence.
+ASIDE = re.compile(r"\(\*chosen\*: (?P<said>[^()]*(?:\([^()]*\)[^()]*)*)\)")
 #: Sources of a robot's numbers, as its file's comments name them.
 SOURCES = ("ARIA", "player", "MobileSim", "manual", "RosAria", "AMRISim")
 _HEAD = """# Fidelity
@@ -37,8 +34,10 @@ drive the robot stand in [foreign programs](foreign.md), and [validation](valida
 
 ## Peripherals
 
-| peripheral | chosen | not modelled | drivers' rows held | seen on silicon | the kit compares |
-|---|---|---|---|---|---|
+Figures count statements of the data sheets; each leads to what they say.
+
+| peripheral | modelled | chosen | not modelled | drivers' rows held | seen on silicon | the kit compares |
+|---|---|---|---|---|---|---|
 """
 _ROBOTS = """
 ## Robots
@@ -47,50 +46,44 @@ Each number of a robot's file has its source beside it; `chosen` counts those th
 none. [The virtual Pioneer](pioneer.md) has the controller's data sheet, and [validation](validation.md) lays it beside
 a simulator of others.
 
-| robot | file | controller | sources named | chosen |
-|---|---|---|---|---|
+| robot | file | based on | controller | sources named | chosen |
+|---|---|---|---|---|---|
 """
 
 
 @dataclass(frozen=True, slots=True)
-class Model:
+class DataSheet:
     """What docs/peripherals.md says of a model."""
 
     title: str
     anchor: str
+    modelled: int  # items that say what it does
     chosen: tuple[str, ...]
     not_modelled: tuple[str, ...]
 
 
-def models(text: str) -> Iterator[Model]:
-    """Yield the models of the page of data sheets that say what they model."""
+def models(text: str) -> Iterator[DataSheet]:
+    """Yield the models of the page of data sheets: its sections that name a source file of a peripheral."""
     for section in SECTION.finditer(text):
         said: dict[str, list[str]] = {"chosen": [], "not modelled": []}
-        if not MARK.search(section["text"]):
+        modelled = 0
+        about, *items = re.split(r"\n\s*\n|\n(?=- )", section["text"].strip())
+        if not re.match(r"`(?:peripherals|fabric)/", about):
             continue
-        kept: list[str] | None = None  # of a mark at the end of its paragraph: what the list below it says
-        before = ""
-        for block in APART.split(section["text"].strip()):
-            marks = list(MARK.finditer(block))
-            if kept is not None and not marks and block.startswith("- "):
-                kept += [before + one for one in statements(block.removeprefix("- "))]
-                continue
-            kept = None
-            ends = [*(one.start() for one in marks), len(block)][1:]
-            for mark, end in zip(marks, ends, strict=True):
-                of_kind = said.get(mark["kind"].lower())
-                before = f"{mark['more'].strip(' ,')}: " if mark["more"].strip(" ,") else ""
-                text_behind = block[mark.end() : end]
-                if of_kind is not None:
-                    of_kind += [before + one for one in statements(text_behind)]
-                kept = None if text_behind.strip() else of_kind
-        title = section["title"].partition(" (")[0]
-        yield Model(title, slug(section["title"]), tuple(said["chosen"]), tuple(said["not modelled"]))
+        for item in items:
+            words = " ".join(item.removeprefix("- ").split())
+            said["chosen"] += [aside["said"] for aside in ASIDE.finditer(words)]
+            if mark := MARK.match(words):
+                more = f"{mark['more'].strip(' ,')}: " if mark["more"].strip(" ,") else ""
+                said[mark["kind"].lower()] += [more + one for one in statements(words[mark.end() :])]
+            else:
+                modelled += item.startswith("- ")
+        title = section["title"]
+        yield DataSheet(title, slug(title), modelled, tuple(said["chosen"]), tuple(said["not modelled"]))
 
 
 def statements(text: str) -> list[str]:
     """Return the statements of a paragraph: what semicolons and full stops part, outside of brackets."""
-    text = " ".join(re.split(r"\n\s*\n", text.strip(), maxsplit=1)[0].split()).rstrip("*").strip()
     parts, depth, start = [], 0, 0
     for at, sign in enumerate(text):
         depth += (sign == "(") - (sign == ")")
@@ -115,9 +108,8 @@ def silicon() -> dict[str, tuple[str, str]]:
 
 
 def family(title: str) -> set[str]:
-    """Return the names of the peripherals that a title is about, without their numbers: {"USART"} of "USART1 to 3"."""
-    names = re.findall(r"[A-Za-z]+", re.sub(r"\bto\b|\band\b", " ", title.replace("bxCAN", "CAN").replace("1, ", " ")))
-    return {re.sub(r"\d+$", "", name).upper() for name in names}
+    """Return the kinds of peripherals that a title is about: {"USART"} of "USART1 to USART3", {"CAN"} of "bxCAN"."""
+    return {re.sub(r"^BX|\d+$|(?<=^GPIO)[A-E]$", "", name) for name in re.findall(r"[A-Z][A-Z0-9]+", title.upper())}
 
 
 def page() -> str:
@@ -127,15 +119,16 @@ def page() -> str:
     measured = silicon()
     lines, details = [], []
     for model in models((ROOT / "docs" / "peripherals.md").read_text(encoding="utf-8")):
-        names = {re.sub(r"A$", "", name) if name == "GPIOA" else name for name in family(model.title)}
+        names = family(model.title)
         rows = sum(asked[name] for name in names)
         shown, kit = next((value for name, value in measured.items() if names & family(name)), ("nothing", "no"))
         drivers = f"{sum(held[name] for name in names)} of {rows}" if rows else "no rows"
-        first = f"[{model.title}](peripherals.md#{model.anchor})"
-        cells = (first, _count(model.chosen, model), f"{len(model.not_modelled)}", drivers, shown, kit)
+        modelled = f"[{model.modelled}](peripherals.md#{model.anchor})"
+        counts = (_count(said, model) for said in (model.chosen, model.not_modelled))
+        cells = (model.title, modelled, *counts, drivers, shown, kit)
         lines.append(f"| {' | '.join(cells)} |")
         if model.chosen or model.not_modelled:
-            details += [f"### {model.title}: chosen, not modelled", ""]
+            details += [f"### {model.title}", ""]
             details += [f"- *chosen*: {one}" for one in model.chosen]
             details += [f"- *not modelled*: {one}" for one in model.not_modelled]
             details.append("")
@@ -143,17 +136,21 @@ def page() -> str:
     return "".join(parts) + "\n".join(details)
 
 
-def _count(said: tuple[str, ...], model: Model) -> str:
-    return f"[{len(said)}](#{slug(f'{model.title}: chosen, not modelled')})" if said else "0"
+def _count(said: tuple[str, ...], model: DataSheet) -> str:
+    return f"[{len(said)}](#{slug(model.title)})" if said else "0"
 
 
 def robots() -> Iterator[str]:
-    """Yield a row for each robot's file."""
-    for path in sorted((ROOT / "p2os" / "robots").glob("*.toml")):
-        text = path.read_text(encoding="utf-8")
-        found = tomllib.loads(text)
-        comments = "\n".join(re.findall(r"#(.*)$", text, re.MULTILINE))
+    """Yield a row for each robot's file; what it leaves out is that of the file that it is based on."""
+    folder = ROOT / "p2os" / "robots"
+    for path in sorted(folder.glob("*.toml")):
+        texts = [path.read_text(encoding="utf-8")]
+        while base := tomllib.loads(texts[-1]).get("based_on"):
+            texts.append((folder / f"{base}.toml").read_text(encoding="utf-8"))
+        found = [tomllib.loads(text) for text in texts]
+        firmware = next(one["firmware"] for one in found if "firmware" in one)
+        comments = "\n".join(re.findall(r"#(.*)$", "\n".join(texts), re.MULTILINE))
         named = [one for one in SOURCES if one.lower() in comments.lower()]
-        chosen = len(re.findall(r"\bchosen\b", comments.partition("\n\n")[0] and comments)) - ("nobody agrees" in text)
-        yield (f"| {found.get('title', path.stem)} | `{path.name}` | {', '.join(found.get('firmware', []))} "
-               f"| {', '.join(named) or 'those of its parent'} | {max(chosen, 0)} |")  # fmt: skip
+        chosen = len(re.findall(r"^ chosen\b", comments, re.MULTILINE))
+        cells = (found[0]["title"], f"`{path.name}`", f"{found[0].get('based_on', '')}", ", ".join(firmware))
+        yield f"| {' | '.join((*cells, ', '.join(named), str(chosen)))} |"

@@ -27,5 +27,5 @@ def page() -> str:
                 continue
             seen.add(picture)
             file, where = (os.path.relpath(path, ROOT / "docs") for path in (picture, one.path))
-            parts.append(f"[![{shown['words']}]({file}){{ loading=lazy }}]({where})\n")
+            parts.append(f"[![{shown['words']}]({file}){{ loading=lazy }}]({where})\n{shown['words']}\n")
     return "\n".join(parts) + "\n</div>\n"

@@ -1,36 +1,33 @@
-/* A page that was opened from a file may start no worker; the search is one. Here it runs in a hidden frame instead. */
+/* A page that was opened from a file may start no worker, and the search is one. Here it runs in a hidden frame instead;
+   messages are copied and come later, as a worker's do. */
 if (location.protocol === "file:") {
   window.Worker = class extends EventTarget {
     constructor(url) {
       super();
-      this.waiting = [];
       this.frame = document.createElement("iframe");
       this.frame.hidden = true;
       document.body.appendChild(this.frame);
       const inside = this.frame.contentWindow;
       inside.postMessage = (data) => {
-        const event = new MessageEvent("message", { data });
-        this.dispatchEvent(event);
-        if (this.onmessage) this.onmessage(event);
+        const copy = structuredClone(data);
+        setTimeout(() => {
+          const event = new MessageEvent("message", { data: copy });
+          this.dispatchEvent(event);
+          if (this.onmessage) this.onmessage(event);
+        });
       };
       const script = inside.document.createElement("script");
       script.src = new URL(url, location.href).href;
-      script.onload = () => {
-        const waiting = this.waiting;
-        this.waiting = null;
-        waiting.forEach((data) => this.postMessage(data));
-      };
-      inside.importScripts = () => { throw new Error("importScripts is not here"); };
+      this.ready = new Promise((resolve) => { script.onload = resolve; });
       inside.document.body.appendChild(script);
     }
 
     postMessage(data) {
-      if (this.waiting) {
-        this.waiting.push(data);
-        return;
-      }
-      const inside = this.frame.contentWindow;
-      inside.dispatchEvent(new inside.MessageEvent("message", { data }));
+      const copy = structuredClone(data);
+      this.ready.then(() => {
+        const inside = this.frame.contentWindow;
+        if (inside) inside.dispatchEvent(new inside.MessageEvent("message", { data: copy }));
+      });
     }
 
     terminate() {
