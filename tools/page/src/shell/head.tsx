@@ -25,6 +25,10 @@ export function Head({ header, app, layout, onLayout, onLink }: Props) {
         {header.lead && <p class="lead">{header.lead}</p>}
       </div>
       {app && <div class="head-tools">
+        {app.store.robots.length > 0 && <label class="inline-label">robot <select aria-label="Robot whose pins, packets and plots are shown" value={app.store.robot.value} onChange={(event) => { app.store.robot.value = event.currentTarget.value; }}>
+          <option value="">all</option>
+          {app.store.robots.map((name) => <option value={name}>{name}</option>)}
+        </select></label>}
         {layout && onLayout && <label class="inline-label">layout <select aria-label="Layout" value={layout} onChange={(event) => onLayout(event.currentTarget.value)}>
           {LAYOUTS.map((one) => <option value={one.id}>{one.title}</option>)}
         </select></label>}
