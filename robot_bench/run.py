@@ -226,6 +226,23 @@ def meta_of(scenario: Scenario, world: World | None, note: str | None, *, is_at_
     parameters = scenario.parameters
     place = "the real one" if is_at_port else str(scenario.world)
     start = Pose(0.0, 0.0, 0.0) if world is None else scenario.start or world.start
+    there: Json = {
+        "world": {"name": place, **UNKNOWN_PLACE} if world is None else world.to_plain(),
+        "robot": {
+            "name": scenario.robot,
+            "front_m": parameters.body.hull_front_m,
+            "rear_m": parameters.body.hull_rear_m,
+            "width_m": parameters.body.hull_width_m,
+            "track_m": parameters.track_mm / 1000,
+            "wheel_diameter_m": parameters.body.wheel_diameter_m,
+            "sonar": [
+                [sonar.x_mm / 1000, sonar.y_mm / 1000, math.radians(sonar.heading_deg)]
+                for sonar in parameters.sonar[: parameters.sonar_fitted]
+            ],
+            "sonar_cone_rad": math.radians(parameters.sonar_cone_deg),
+            "sonar_range_m": parameters.sonar_range_m,
+        },
+    }
     return {
         "version": installed_version(),
         "scenario": scenario.name,
@@ -251,21 +268,7 @@ def meta_of(scenario: Scenario, world: World | None, note: str | None, *, is_at_
         "note": note,
         "pins": pins_of(scenario),
         "start": {"x": start.x_m, "y": start.y_m, "heading": start.heading_rad},
-        "world": {"name": place, **UNKNOWN_PLACE} if world is None else world.to_plain(),
-        "robot": {
-            "name": scenario.robot,
-            "front_m": parameters.body.hull_front_m,
-            "rear_m": parameters.body.hull_rear_m,
-            "width_m": parameters.body.hull_width_m,
-            "track_m": parameters.track_mm / 1000,
-            "wheel_diameter_m": parameters.body.wheel_diameter_m,
-            "sonar": [
-                [sonar.x_mm / 1000, sonar.y_mm / 1000, math.radians(sonar.heading_deg)]
-                for sonar in parameters.sonar[: parameters.sonar_fitted]
-            ],
-            "sonar_cone_rad": math.radians(parameters.sonar_cone_deg),
-            "sonar_range_m": parameters.sonar_range_m,
-        },
+        **(there if scenario.has_robot else {}),
     }
 
 

@@ -5,11 +5,17 @@ import typer
 from bluepill_sim.cli import coverage, debug, info, parts, pins, profile, run, trace
 from bluepill_sim.cli.browser import page
 from bluepill_sim.cli.comparisons import compare_cores, compare_silicon, races
+from simbase.command_line.help_pages import VerbPage
 
-HELP = """Run, look into and debug a BluePill program, without a robot.
+HELP = """Run, inspect and debug a BluePill program, without a robot.
 
-FIRMWARE is an ELF, HEX or BIN file for an STM32F103C8; with debug information
+FIRMWARE is an ELF, HEX or BIN file for an STM32F103C8. With debug information
 in the ELF, places are shown by symbol and line.
+
+\b
+Examples:
+  {program} run mine.elf              one second of virtual time
+  {program} pins mine.elf --for 2s    what each pin did
 """
 
 
@@ -25,4 +31,5 @@ def add_verbs(app: typer.Typer) -> None:
     modules = (run, parts, debug, info, pins, trace, coverage, profile, races, compare_silicon, compare_cores, page)
     for module in modules:
         name = module.__name__.rpartition(".")[2]
-        app.command(name.replace("_", "-"), help=module.HELP)(getattr(module, name))
+        page_class = getattr(module, "PAGE", VerbPage)
+        app.command(name.replace("_", "-"), help=module.HELP, cls=page_class)(getattr(module, name))

@@ -1,10 +1,10 @@
 """`p2os mcu run`: boots a firmware and shows what it prints."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Annotated, Protocol
+from typing import Annotated, ClassVar, Protocol
 
 import typer
 
@@ -23,33 +23,42 @@ from bluepill_sim.cli.driving import (
 )
 from bluepill_sim.cli.parts import attach_parts, show_parts
 from bluepill_sim.cli.quantities import Firmware, option, time_option
+from bluepill_sim.cli.viewing import ViewedRun, view_run
 from bluepill_sim.core.halts import ChipReached
+from bluepill_sim.parts.registry import parse_part
+from simbase.command_line.gdb_option import GDB_PORT, usual_port
+from simbase.command_line.help_pages import Usual, VerbPage
+from simbase.errors import UsageError
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos, Reason
-from simbase.units import BAUD
+from simbase.units import BAUD, PORT
 
-HELP = """Boot a firmware on an emulated BluePill.
+HELP = """Run a firmware on an emulated BluePill.
 
-What it sends on USART1 goes to stdout, as text: what would act on a terminal is written as \\x1b and the like, unless
---raw. Time is virtual: a program that sleeps runs much faster than real time. Exit
-code 1: the firmware died of a fault, or the wall clock's budget was used up;
-then the last blocks that it ran are shown. Resets are no failure (a watchdog may be
-what is tried): the last line counts them, by cause. 100 in a row within a millisecond of each other, with no change at
-a pin and no character meanwhile, are: such a program is ended.
+USART1 goes to stdout as text; control characters appear as \\x1b and the like
+unless --raw. Time is virtual: a program that sleeps runs much faster than real
+time.
+
+Exit code 1: the firmware died of a fault, or the wall clock's budget was used
+up; its last blocks are shown. Resets are no failure; the last line counts them
+by cause. 100 resets, each within a millisecond of the last and without a pin
+change or character, end the program as failed.
 
 \b
 Examples:
   {program} run mine.elf                          one second of virtual time
-  {program} run mine.elf --for 2s --uart log.txt  what it prints goes to a file
-  {program} run mine.elf --realtime --uart pty:   talk to it with any terminal program, until Ctrl-C
-  {program} run mine.elf --itm log.txt            what ITM_SendChar prints, with times
-  {program} run mine.elf --drive PA6=1@500ms      something comes before a sensor
-  {program} run mine.elf --drive PA0=1.65V        what the ADC sees on a pin
+  {program} run mine.elf --for 2s --uart log.txt  its output goes to a file
+  {program} run mine.elf --realtime --uart pty:   a serial port for any terminal program
+  {program} run mine.elf --itm log.txt            the output of ITM_SendChar, with times
+  {program} run mine.elf --drive PA6=1@500ms      a level on an input
+  {program} run mine.elf --drive PA0=1.65V        a voltage for the ADC
   {program} run mine.elf --until "pin PC13 low"   up to an event
   {program} run mine.elf --attach ssd1306,on=I2C1 --parts shots      an OLED, and its picture at the end
   {program} run mine.elf --attach ./mine.py:Sensor,on=I2C1,x=3       a part of your own
-  {program} run mine.elf --usb pty:               plug it in: its USB serial port is a terminal here
-  {program} run mine.elf --can vcan0              its CAN on one of this machine; candump and cansend work
-  {program} run mine.elf --can udp:127.0.0.1:29536     the same without SocketCAN: a frame is a datagram
+  {program} run mine.elf --usb pty:               plug in USB: its serial port is a terminal here
+  {program} run mine.elf --can vcan0              join its CAN to SocketCAN: candump, cansend
+  {program} run mine.elf --can udp:127.0.0.1:29536     the same by datagrams, without SocketCAN
+  {program} run mine.elf --view              live on a page in the browser: pins, program, chip; halted and set back
+  {program} run mine.elf --view --gdb        the page, and GDB at the same halt
 """
 
 #: chosen: how often typed input reaches a running program, and its time is held back to the clock.
@@ -61,6 +70,15 @@ _STRIDES_NS: tuple[Nanos, Nanos] = NS_PER_MS // 10, 20 * NS_PER_MS
 _BUDGET_NS: Nanos = 600 * NS_PER_S
 #: Without an end: until Ctrl-C.
 _FOR_EVER_NS: Nanos = 365 * 24 * 3600 * NS_PER_S
+
+
+class ChipRunPage(VerbPage):
+    """Lets `--gdb` stand without a port."""
+
+    usual: ClassVar[Mapping[str, Usual]] = {"--gdb": usual_port}
+
+
+PAGE = ChipRunPage
 
 
 class _Opened(Protocol):
@@ -121,12 +139,44 @@ def run(
         list[str] | None,
         typer.Option(help="Attach a part; repeatable. The verb `parts` lists them.", metavar="PART,KEY=VALUE,..."),
     ] = None,
+    view: Annotated[
+        bool, typer.Option("--view", help="Show it live on a page in the browser, at the clock's speed, until Ctrl-C.")
+    ] = False,
+    no_browser: Annotated[bool, typer.Option("--no-browser", help="With --view: print its link alone.")] = False,
+    gdb: Annotated[
+        int | None,
+        option(
+            PORT,
+            "--gdb",
+            purpose=f"With --view: GDB may come at this TCP port, {GDB_PORT} if none is named.",
+            metavar="[PORT]",
+            least="0",
+            most="65535",
+        ),
+    ] = None,
     parts_folder: Annotated[
         Path | None, typer.Option("--parts", help="Where pictures and files of parts go at the end.", metavar="FOLDER")
     ] = None,
 ) -> None:
     """Boot a firmware."""
-    end_ns = span_ns if span_ns is not None else _FOR_EVER_NS if realtime else NS_PER_S
+    end_ns = span_ns if span_ns is not None else _FOR_EVER_NS if realtime or view else NS_PER_S
+    if view:
+        beside = {
+            "--uart": uart != "-", "--raw": raw, "--realtime": realtime, "--drive": bool(drive), "--until": until,
+            "--usb": usb, "--can": can, "--can-log": can_log, "--itm": itm, "--swo": swo, "--strict": strict,
+            "--parts": parts_folder, "--budget": budget_ns != _BUDGET_NS,
+        }  # fmt: skip
+        _refuse_beside_view(beside)
+        specs = [parse_part(one) for one in attach or []]
+        view_run(
+            ViewedRun(
+                firmware=Path(firmware), end_ns=end_ns, usart_baud=usart_baud, parts=specs, gdb=gdb,
+                is_opened=not no_browser,
+            )
+        )  # fmt: skip
+        return
+    if gdb is not None or no_browser:
+        raise UsageError(f"{'--gdb' if gdb is not None else '--no-browser'} goes with --view only", hint="add --view")
     board = BluePill(firmware, strict=strict)
     board.usart1.far_baud = usart_baud
     changes = parse_changes(drive or [], board)
@@ -166,6 +216,17 @@ def run(
         print_status(f"can: {bus.describe()}")
     if print_fault(board):
         raise typer.Exit(1)
+
+
+def _refuse_beside_view(options: Mapping[str, object]) -> None:
+    """Refuse what a page has in its own way.
+
+    Raises:
+        UsageError: One of the options is given.
+    """
+    for name, value in options.items():
+        if value:
+            raise UsageError(f"{name} cannot stand beside --view", hint="the page has consoles, hands and halts")
 
 
 def bounded(board: BluePill, budget_ns: Nanos) -> Callable[[Nanos], ChipReached]:

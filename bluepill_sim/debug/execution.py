@@ -13,7 +13,7 @@ import contextlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from bluepill_sim.core import HaltKind
+from bluepill_sim.core import HaltKind, Watchpoint
 from bluepill_sim.core.faults import FaultKind, SeenFault
 from bluepill_sim.core.halts import ChipReached
 from bluepill_sim.debug.history import MOST_POINTS, History, Point
@@ -55,6 +55,8 @@ class Execution:
         slice_ns: how often it looks for a request to stop, at least.
     """
 
+    read_only = ""
+
     def __init__(
         self,
         machine: Machine,
@@ -85,6 +87,14 @@ class Execution:
         chip.engine.watchpoints.clear()
         chip.processor.halts_on_bkpt = False
         chip.processor.on_fault = self._report
+
+    def set_point(self, point: int | Watchpoint, *, is_set: bool) -> None:
+        """Halt before the instruction at an address, or at an access; or no longer."""
+        engine = self.machine.board.chip.engine
+        if isinstance(point, Watchpoint):
+            (engine.watchpoints.add if is_set else engine.watchpoints.discard)(point)
+        else:
+            (engine.breakpoints.add if is_set else engine.breakpoints.discard)(point)
 
     def changed(self) -> None:
         """Begin the history anew: the machine has been written to."""

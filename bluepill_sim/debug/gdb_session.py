@@ -1,10 +1,11 @@
 """What each packet of GDB asks for, and the answer to it.
 
 Sans I/O: payloads go in, payloads come out; the owner of the connection frames
-them. Commands that run the machine return when it is halted.
+them. Commands that run the machine return when it is halted; where another one runs
+it, they are answered by `stopped` once it is.
 
 Source: Debugging with GDB, appendix E "GDB Remote Serial Protocol".
-Invariant: any payload at all gives an answer (empty: not supported), never an exception.
+Invariant: any payload at all gives an answer (empty: not supported; None: later), never an exception.
 """
 
 import binascii
@@ -12,9 +13,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from bluepill_sim.core import WatchKind, Watchpoint
-from bluepill_sim.debug.execution import Execution
 from bluepill_sim.debug.inspector import Inspector
-from bluepill_sim.debug.machine import HaltReason, StopKind
+from bluepill_sim.debug.machine import DebugTarget, HaltReason, StopKind
 from bluepill_sim.debug.monitor import Monitor
 from bluepill_sim.debug.packets import MAX_BYTES
 from bluepill_sim.debug.target_description import FLASH_PAGE_BYTES, memory_map_xml, target_xml
@@ -34,6 +34,8 @@ _MAX_READ = MAX_BYTES // 2 - 16
 _LONGEST_WATCH = 4096
 _HEX_DIGITS = b"0123456789abcdefABCDEF"
 _MOST_DIGITS = 16
+#: What writes registers or memory.
+_WRITES, _WRITING_WORDS = frozenset({b"G", b"P", b"M", b"X"}), b"vFlash"
 _WATCH_KINDS = {b"2": WatchKind.WRITE, b"3": WatchKind.READ, b"4": WatchKind.ACCESS}
 _WATCH_WORDS = {WatchKind.WRITE: b"watch", WatchKind.READ: b"rwatch", WatchKind.ACCESS: b"awatch"}
 _FEATURES = (
@@ -57,17 +59,16 @@ class GdbSession:
     """One debugger at one machine.
 
     Args:
-        execution: the machine, standing still.
+        target: the machine, standing still.
     """
 
-    def __init__(self, execution: Execution) -> None:
+    def __init__(self, target: DebugTarget) -> None:
         self.state = State()
-        self._execution = execution
-        self._inspector = Inspector(execution.machine.board)
-        self._monitor = Monitor(execution)
+        self._target = target
+        self._monitor = Monitor(target)
         self._stop = HaltReason(StopKind.STEP)
         self._flash: dict[int, bytes] = {}
-        self._by_letter: dict[bytes, Callable[[bytes], bytes]] = {
+        self._by_letter: dict[bytes, Callable[[bytes], bytes | None]] = {
             b"?": lambda _: self._stop_reply(self._stop),
             b"g": lambda _: _hex(self._inspector.read_registers()),
             b"G": self._write_registers,
@@ -76,10 +77,10 @@ class GdbSession:
             b"m": self._read_memory,
             b"M": self._write_memory,
             b"X": self._write_binary,
-            b"c": lambda at: self._resume(at, self._execution.go_on),
-            b"s": lambda at: self._resume(at, self._execution.step),
-            b"C": lambda rest: self._resume(rest.partition(b";")[2], self._execution.go_on),
-            b"S": lambda rest: self._resume(rest.partition(b";")[2], self._execution.step),
+            b"c": lambda at: self._resume(at, self._target.go_on),
+            b"s": lambda at: self._resume(at, self._target.step),
+            b"C": lambda rest: self._resume(rest.partition(b";")[2], self._target.go_on),
+            b"S": lambda rest: self._resume(rest.partition(b";")[2], self._target.step),
             b"b": self._backwards,
             b"Z": lambda rest: self._point(rest, is_set=True),
             b"z": lambda rest: self._point(rest, is_set=False),
@@ -92,7 +93,7 @@ class GdbSession:
             b"v": self._verbose,
         }
 
-        self._by_word: dict[bytes, Callable[[bytes], bytes]] = {
+        self._by_word: dict[bytes, Callable[[bytes], bytes | None]] = {
             b"Cont": self._continue,
             b"Kill": lambda _: self._leave(was_killed=True),
             b"FlashErase": lambda rest: self._erase_flash(*_numbers(rest)),
@@ -100,11 +101,22 @@ class GdbSession:
             b"FlashDone": lambda _: self._program_flash(),
         }
 
-    def answer(self, payload: bytes) -> bytes:
-        """Return the answer to a payload; empty: not supported."""
+    @property
+    def _inspector(self) -> Inspector:
+        return Inspector(self._target.machine.board)
+
+    def stopped(self, stop: HaltReason) -> bytes:
+        """Return the answer to what went on, now that the machine is halted."""
+        self._stop = stop
+        return self._stop_reply(stop)
+
+    def answer(self, payload: bytes) -> bytes | None:
+        """Return the answer to a payload; empty: not supported; None: `stopped` is, once the machine is halted."""
         act = self._by_letter.get(payload[:1])
         if act is None:
             return _NOT_SUPPORTED
+        if self._target.read_only and (payload[:1] in _WRITES or payload.startswith(_WRITING_WORDS)):
+            return b"E." + self._target.read_only.encode()
         try:
             return act(payload[1:])
         except (ValueError, IndexError, BluePillError):
@@ -118,7 +130,7 @@ class GdbSession:
             begin, end = self._inspector.layout[number]
             if end <= len(data):
                 self._inspector.write_register(number, data[begin:end])
-        self._execution.changed()
+        self._target.changed()
         return _OK
 
     def _read_register(self, digits: bytes) -> bytes:
@@ -130,7 +142,7 @@ class GdbSession:
     def _write_register(self, rest: bytes) -> bytes:
         number, _, digits = rest.partition(b"=")
         self._inspector.write_register(_number(number), binascii.unhexlify(digits))
-        self._execution.changed()
+        self._target.changed()
         return _OK
 
     def _read_memory(self, rest: bytes) -> bytes:
@@ -152,25 +164,26 @@ class GdbSession:
         if data and not self._inspector.write_memory(address, data):
             return _NO_MEMORY
         if data:
-            self._execution.changed()
+            self._target.changed()
         return _OK
 
     # Running.
 
-    def _resume(self, address: bytes, run: Callable[[], HaltReason]) -> bytes:
+    def _resume(self, address: bytes, run: Callable[[], HaltReason | None]) -> bytes | None:
         if address:
+            if self._target.read_only:
+                return b"E." + self._target.read_only.encode()
             self._inspector.set_register("pc", _address(address))
-            self._execution.changed()
-        self._stop = run()
-        return self._stop_reply(self._stop)
+            self._target.changed()
+        stop = run()
+        return None if stop is None else self.stopped(stop)
 
-    def _backwards(self, rest: bytes) -> bytes:
+    def _backwards(self, rest: bytes) -> bytes | None:
         if rest not in {b"s", b"c"}:
             return _NOT_SUPPORTED
-        if not self._execution.machine.can_rewind:
+        if not self._target.machine.can_rewind:
             return _BAD
-        self._stop = self._execution.step_back() if rest == b"s" else self._execution.go_back()
-        return self._stop_reply(self._stop)
+        return self._resume(b"", self._target.step_back if rest == b"s" else self._target.go_back)
 
     def _stop_reply(self, stop: HaltReason) -> bytes:
         match stop.kind:
@@ -185,7 +198,7 @@ class GdbSession:
         return b"T%02xthread:1;" % _SIGNALS.get(stop.kind, _SIGTRAP)
 
     def _watchpoint_at(self, address: int | None) -> Watchpoint | None:
-        points = self._execution.machine.board.chip.engine.watchpoints
+        points = self._target.machine.board.chip.engine.watchpoints
         # An access may begin up to three bytes before what it reaches into.
         near = [p for p in points if address is not None and p.address - 4 < address < p.address + p.size]
         return min(near, key=lambda p: (p.address, p.size, p.kind.value), default=None)
@@ -193,16 +206,14 @@ class GdbSession:
     def _point(self, rest: bytes, *, is_set: bool) -> bytes:
         kind, where, size, *_ = rest.split(b";")[0].split(b",")
         address, length = _address(where), _number(size)
-        engine = self._execution.machine.board.chip.engine
         if kind in {b"0", b"1"}:
-            (engine.breakpoints.add if is_set else engine.breakpoints.discard)(address & ~1)
+            self._target.set_point(address & ~1, is_set=is_set)
             return _OK
         if kind not in _WATCH_KINDS:
             return _NOT_SUPPORTED
         if not 1 <= length <= _LONGEST_WATCH:
             return _BAD
-        point = Watchpoint(address, length, _WATCH_KINDS[kind])
-        (engine.watchpoints.add if is_set else engine.watchpoints.discard)(point)
+        self._target.set_point(Watchpoint(address, length, _WATCH_KINDS[kind]), is_set=is_set)
         return _OK
 
     def _leave(self, *, was_killed: bool) -> bytes:
@@ -226,15 +237,15 @@ class GdbSession:
             return _OK
         return _NOT_SUPPORTED
 
-    def _verbose(self, rest: bytes) -> bytes:
+    def _verbose(self, rest: bytes) -> bytes | None:
         if rest == b"Cont?":
             return b"vCont;c;C;s;S"
         name, _, argument = rest.partition(b":" if rest.startswith(b"Flash") else b";")
         act = self._by_word.get(name)
         return _NOT_SUPPORTED if act is None else act(argument)
 
-    def _continue(self, actions: bytes) -> bytes:
-        run = {b"c": self._execution.go_on, b"s": self._execution.step}.get(actions[:1].lower())
+    def _continue(self, actions: bytes) -> bytes | None:
+        run = {b"c": self._target.go_on, b"s": self._target.step}.get(actions[:1].lower())
         return _BAD if run is None else self._resume(b"", run)
 
     def _write_flash(self, rest: bytes) -> bytes:
@@ -254,7 +265,7 @@ class GdbSession:
         for address, data in rows:
             if data and not self._inspector.write_memory(address, data):
                 return _NO_MEMORY
-        self._execution.changed()
+        self._target.changed()
         return _OK
 
 

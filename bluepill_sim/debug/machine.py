@@ -12,6 +12,7 @@ from enum import Enum
 from typing import Protocol
 
 from bluepill_sim.board import BluePill
+from bluepill_sim.core import Watchpoint
 from bluepill_sim.core.halts import ChipReached
 from simbase.state import Stateful
 from simbase.timing import Nanos
@@ -76,6 +77,36 @@ class Machine(Protocol):
 
     def halted(self) -> None:
         """Act on a halt of the chip: a real robot is stopped here."""
+
+
+class DebugTarget(Protocol):
+    """A machine that a debugger runs; where another one runs it, what runs it returns None: the halt comes later."""
+
+    @property
+    def machine(self) -> Machine:
+        """What is run."""
+
+    @property
+    def read_only(self) -> str:
+        """Why nothing of it is written to, in a line; empty: it is."""
+
+    def go_on(self) -> HaltReason | None:
+        """Run until something stops the chip."""
+
+    def step(self) -> HaltReason | None:
+        """Run one instruction of the program."""
+
+    def step_back(self) -> HaltReason | None:
+        """Go to the state before the last instruction."""
+
+    def go_back(self) -> HaltReason | None:
+        """Go to the last stop before this state."""
+
+    def set_point(self, point: int | Watchpoint, *, is_set: bool) -> None:
+        """Halt before the instruction at an address, or at an access; or no longer."""
+
+    def changed(self) -> None:
+        """Take that the machine has been written to."""
 
 
 class LoneChip(Stateful):

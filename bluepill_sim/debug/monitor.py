@@ -3,7 +3,7 @@
 Invariant: any words give lines for a person, never an exception.
 """
 
-from bluepill_sim.debug.execution import Execution
+from bluepill_sim.debug.machine import DebugTarget
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.spans import to_nanos
 from simbase.timing import NS_PER_S
@@ -29,40 +29,46 @@ COMMANDS = {
 }
 
 
+#: What changes the machine; `pin` does with a level.
+_WRITING = frozenset({"reset", "wait", "restore"})
+
+
 class Monitor:
     """Carries out the commands for one debugger.
 
     Args:
-        execution: the machine, standing still.
+        target: the machine, standing still.
     """
 
-    def __init__(self, execution: Execution) -> None:
-        self._execution = execution
+    def __init__(self, target: DebugTarget) -> None:
+        self._target = target
         self._snapshots: dict[str, object] = {}
 
     def run(self, line: str) -> str:
         """Return the output of a command."""
         name, *words = line.split() or ["help"]
         is_known = any(usage.split()[0] == name for usage in COMMANDS)
+        if self._target.read_only and (name in _WRITING or (name == "pin" and len(words) > 1)):
+            return f"{self._target.read_only}\n"
         return (getattr(self, f"_{name}")(words) if is_known else f"{line}: {_UNKNOWN}") + "\n"
 
     def _help(self, _words: list[str]) -> str:
         return "\n".join(f"{usage:<22} {text}" for usage, text in COMMANDS.items())
 
     def _reset(self, _words: list[str]) -> str:
-        board = self._execution.machine.board
+        board = self._target.machine.board
         board.reset()
-        self._execution.changed()
+        self._target.changed()
         return f"reset: at {board.where()}"
 
     def _time(self, _words: list[str]) -> str:
-        board = self._execution.machine.board
+        board = self._target.machine.board
         parts = [f"{board.now_ns / NS_PER_S:.9f} s of virtual time", f"{board.cycle} cycles"]
         parts += [f"{board.hclk_hz / 1e6:g} MHz", *(["asleep"] if board.is_asleep else [])]
         return ", ".join(parts)
 
     def _wait(self, words: list[str]) -> str:
-        machine = self._execution.machine
+        machine = self._target.machine
         board = machine.board
         try:
             [span_ns] = map(to_nanos, words)
@@ -75,17 +81,17 @@ class Monitor:
         with board.chip.halted_core():
             while board.now_ns < end_ns:
                 machine.advance_to(end_ns)
-        self._execution.changed()
+        self._target.changed()
         causes = ", ".join(cause.name for cause in board.resets - before)
         return f"{self._time([])}{f'; reset by {causes}: at {board.where()}' if causes else ''}"
 
     def _pins(self, words: list[str]) -> str:
-        names = [pin.name for pin in self._execution.machine.board.pins]
+        names = [pin.name for pin in self._target.machine.board.pins]
         lines = [self._line(name, every=bool(words)) for name in names]
         return "\n".join(line for line in lines if line) or "no pin is in use"
 
     def _line(self, name: str, *, every: bool) -> str:
-        pin = self._execution.machine.board.pin(name)
+        pin = self._target.machine.board.pin(name)
         if not every and pin.mode.value == "floating input" and pin.driven is None and pin.holder is None:
             return ""
         level = "floating" if pin.is_floating else "high" if pin.level else "low"
@@ -96,18 +102,18 @@ class Monitor:
         return f"{name:<5} {level:<9} {pin.mode.value}{f' ({use})' if use else ''}{outside}"
 
     def _pin(self, words: list[str]) -> str:
-        board = self._execution.machine.board
+        board = self._target.machine.board
         bonded = {pin.name for pin in board.pins}
         name = words[0].upper() if words else ""
         if name not in bonded or len(words) > 2 or (len(words) == 2 and words[1].lower() not in _LEVELS):
             return f"pin {' '.join(words)}: {_UNKNOWN}"
         if len(words) == 2:
             board.pin(name).drive(_LEVELS[words[1].lower()])
-            self._execution.changed()
+            self._target.changed()
         return self._line(name, every=True)
 
     def _registers(self, words: list[str]) -> str:
-        board = self._execution.machine.board
+        board = self._target.machine.board
         parts = board.chip.parts.by_name
         if not words:
             return ", ".join(parts)
@@ -128,28 +134,28 @@ class Monitor:
         )
 
     def _snapshot(self, words: list[str]) -> str:
-        if not self._execution.machine.can_rewind:
+        if not self._target.machine.can_rewind:
             return "a real robot cannot go back: no snapshots"
         name = words[0] if words else "1"
-        self._snapshots[name] = self._execution.machine.snapshot()
+        self._snapshots[name] = self._target.machine.snapshot()
         return f"snapshot {name} at {self._time([])}"
 
     def _restore(self, words: list[str]) -> str:
         name = words[0] if words else "1"
         if name not in self._snapshots:
             return f"no snapshot {name}; there are: {', '.join(sorted(self._snapshots)) or 'none'}"
-        self._execution.machine.restore(self._snapshots[name])
-        self._execution.changed()
+        self._target.machine.restore(self._snapshots[name])
+        self._target.changed()
         return f"restored {name}: {self._time([])}; say maintenance flush register-cache"
 
     def _fault(self, _words: list[str]) -> str:
-        fault = self._execution.machine.board.fault
+        fault = self._target.machine.board.fault
         if fault is None:
             return "no fault"
-        return "\n".join([f"{fault}\n{fault.register_dump}", *self._execution.machine.board.last_blocks()])
+        return "\n".join([f"{fault}\n{fault.register_dump}", *self._target.machine.board.last_blocks()])
 
     def _blocks(self, _words: list[str]) -> str:
-        return "\n".join(self._execution.machine.board.last_blocks()) or "nothing has run yet"
+        return "\n".join(self._target.machine.board.last_blocks()) or "nothing has run yet"
 
     def _warnings(self, _words: list[str]) -> str:
-        return "\n".join(self._execution.machine.board.warnings) or "no warnings"
+        return "\n".join(self._target.machine.board.warnings) or "no warnings"

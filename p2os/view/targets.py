@@ -33,6 +33,8 @@ class ViewTarget:
     run: Callable[[], None] | None = None
     #: Returns it as a robot that its page drives, no faster than m/s and deg/s; None: it is no robot at a port.
     driven: "Callable[[float, float], ViewTarget] | None" = None
+    #: Returns it as a program at which GDB halts, too, at a TCP port of this machine (0: a free one); None: it is none.
+    debugged: "Callable[[int], ViewTarget] | None" = None
 
 
 @dataclass(frozen=True, slots=True)

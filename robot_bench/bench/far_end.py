@@ -68,6 +68,8 @@ def make_far_end(
     Raises:
         ScenarioError: Its mode has not what it asks for.
     """
+    if not scenario.has_robot:
+        return FarEnd(robots=())
     if scenario.own_robot is not None:
         pins = {wire.name: wire.pin for wire in scenario.own_robot.robot.signals}
         robot = scenario.own_robot.build(body, harness, lambda signal: cast("AnalogPin", chip.pin(pins[signal])))

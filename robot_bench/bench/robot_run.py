@@ -32,6 +32,7 @@ from robot_bench.bench.board import (
 )
 from robot_bench.bench.far_end import make_far_end
 from robot_bench.bench.hand_driven_body import HandDrivenBody
+from robot_bench.bench.lone_board import NOWHERE
 from robot_bench.bench.origin import LATER, origin_of, refuse_others
 from robot_bench.bench.waiting import EventWait
 from robot_bench.direct.differential.robot import DifferentialRobot
@@ -111,15 +112,16 @@ class RobotRun(Stateful):
         self.samplers: list[VariableSampler] = []
         self._shared = shared
         pinout = load_pinout()
-        world = load_world(scenario.world, seed=scenario.seed)
-        refuse_what_its_world_refuses(scenario, world)
+        world = load_world(scenario.world, seed=scenario.seed) if scenario.has_robot else NOWHERE
+        if scenario.has_robot:
+            refuse_what_its_world_refuses(scenario, world)
         if scenario.robots:
             raise TypeError("a scenario with several robots has a bench each: Bench.from_scenario, or Bench.together")
         body = body_of(scenario, world) if shared is None else shared.body_of(scenario.name)
         chip = chip or boot(scenario)
         own = scenario.own_robot
         self.harness = harness = make_harness(pinout) if own is None else make_own_harness(own.robot.signals)
-        self.recorder = Recorder(self.trace, harness, body=body)
+        self.recorder = Recorder(self.trace, harness, body=body if scenario.has_robot else None)
         self.recorder.on_event = log_bench_event
         self.waits = EventWait(self.events, self.trace, harness)
         far_end = make_far_end(scenario, pinout, body, chip, harness, self.recorder, is_among_others=shared is not None)
@@ -192,6 +194,8 @@ class RobotRun(Stateful):
     @property
     def note(self) -> str | None:
         """Return what a reader of the result has to know of the body."""
+        if not self.scenario.has_robot:
+            return None
         return "; ".join(filter(None, (body_note(self.scenario.body), self.parts.body.note))) or None
 
     @property
@@ -357,6 +361,9 @@ class RobotRun(Stateful):
 
     def _plug_in(self, chip: LeadingChip) -> tuple[WorldSenses, ...]:
         """Attach the scenario's parts to the board, and have them sense the world."""
+        if not self.scenario.has_robot:
+            plug_in(self.scenario, chip, self.recorder)
+            return ()
         senses = WorldSenses(self.parts.body, self.bring_robot_to)
         plug_in(self.scenario, chip, self.recorder, senses)
         return (senses,)

@@ -5,7 +5,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import typer
 
@@ -20,6 +20,7 @@ from p2os.pioneer.body.factory import BEST, resolve_body
 from p2os.toml_schema import within
 from p2os.transport import open_url
 from robot_bench.bench.recorded_variables import variables_of
+from robot_bench.cli.debugging.gdb import gdb_port
 from robot_bench.cli.names import scenario_names, setting_keys, variable_names
 from robot_bench.cli.progress import RunDisplay
 from robot_bench.cli.shown.live_fleet import LiveFleet
@@ -46,7 +47,8 @@ from robot_bench.scenario.loading import load_scenario
 from robot_bench.scenario.options import ScenarioOptions
 from robot_bench.scenario.scenario import Scenario
 from robot_bench.scenario.sweep import MOST_RUNS, read_seeds
-from simbase.command_line.help_pages import VerbPage
+from simbase.command_line.gdb_option import GDB_PORT, usual_port
+from simbase.command_line.help_pages import Usual, VerbPage
 from simbase.command_line.program import EXIT_INTERRUPTED
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos
@@ -57,14 +59,14 @@ HELP = """Run a scenario: a BluePill program drives a robot.
 
 The firmware boots on an emulated board, and its pins drive the robot.
 
-SCENARIO is one of those that ship (free-drive, motors, sensors, encoders, dodge,
+SCENARIO is a shipped one (free-drive, motors, sensors, encoders, dodge,
 rover, two-dodge)
-or a TOML file. What the options leave open is the scenario's. The run folder holds
-the trace, the pins as VCD and for PulseView, and report.html.
+or a TOML file. Options override its keys. The run folder holds the trace, the
+pins as VCD and for PulseView, and report.html.
 
 Exit code: 0 all goals were met, 1 one was missed or the run failed, 2 wrong
 usage or file, 130 interrupted (the run folder is complete up to there).
-However a run ends, its folder says so; --out never overwrites a run without --force.
+The run folder records how the run ended; --out overwrites one only with --force.
 
 \b
 Examples:
@@ -74,12 +76,13 @@ Examples:
   p2os run dodge --world arena --seed 7 --json      one JSON object for a script
   p2os run dodge --realtime                         at the speed of the clock
   p2os run dodge --seeds 0-99 -j 2 --junit r.xml    a run a seed, two at a time; a table
-  p2os run dodge --set threshold_m=0.4              any key of the scenario, otherwise
+  p2os run dodge --set threshold_m=0.4              another value for a scenario's key
   p2os run dodge --coverage --profile               lines, branches, cycles of the whole run
   p2os run dodge --coverage --fail-under 80         exit code 1 below 80 % of the lines
   p2os run dodge --gdb 3333                         under GDB; the robot stands still at a halt
   p2os run dodge --watch-variable dodge.state       recorded, and a plot in p2os view
   p2os run dodge --view                             live on a page in the browser
+  p2os run dodge --view --gdb                       the page, and GDB at the same halt
   p2os run dodge --foxglove                         live in Foxglove or Lichtblick
   p2os run dodge --ros                              its pins as topics of ROS 2 (docs/ros.md)
   p2os run dodge --port serial:/dev/ttyUSB0         drive a real Pioneer; asks first
@@ -92,27 +95,20 @@ FOXGLOVE_PORT = "8765"
 _FLAGS = {"adapter_core": "--adapter", "duration_s": "--duration", "usart_baud": "--usart-baud"}
 
 
-class RealtimeCommand(VerbPage):
-    """Lets `--realtime`, `--foxglove` and `--ros` stand without what follows them: 1, the usual port, or DDS."""
+class RunPage(VerbPage):
+    """Lets some options stand without what follows them: factor 1, the usual port, or DDS."""
 
-    def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:  # type: ignore[override]  # typer's own class
-        """Insert what is missing."""
-        filled = []
-        for place, word in enumerate(args):
-            filled.append(word)
-            following = args[place + 1] if place + 1 < len(args) else ""
-            if word == "--realtime" and not _is_number(following):
-                filled.append("1")
-            if word == "--foxglove" and not following.rpartition(":")[2].isdecimal():
-                filled.append(FOXGLOVE_PORT)
-            if word == "--ros":
-                filled += network_of("ros").place_before(following)
-        return super().parse_args(ctx, filled)
+    usual: ClassVar[Mapping[str, Usual]] = {
+        "--realtime": lambda following: () if _is_number(following) else ("1",),
+        "--foxglove": lambda following: () if following.rpartition(":")[2].isdecimal() else (FOXGLOVE_PORT,),
+        "--gdb": usual_port,
+        "--ros": lambda following: network_of("ros").place_before(following),
+    }
 
 
 def register(app: typer.Typer) -> None:
     """Add the verb."""
-    app.command("run", help=HELP, rich_help_panel=BENCH, cls=RealtimeCommand)(run)
+    app.command("run", help=HELP, rich_help_panel=BENCH, cls=RunPage)(run)
 
 
 def run(
@@ -194,7 +190,14 @@ def run(
     ] = None,
     gdb: Annotated[
         int | None,
-        option(PORT, "--gdb", purpose="Wait for GDB on this TCP port; 0 takes a free one.", least="0", most="65535"),
+        option(
+            PORT,
+            "--gdb",
+            purpose=f"Wait for GDB on this TCP port, {GDB_PORT} if none is named; 0 takes a free one.",
+            metavar="[PORT]",
+            least="0",
+            most="65535",
+        ),
     ] = None,
     ros: Annotated[
         str | None,
@@ -263,7 +266,7 @@ def run(
         raise UsageError("--foxglove-origin goes with --foxglove only", hint="add --foxglove")
     refuse_beside("foxglove", foxglove, port=port, gdb=gdb, ros=ros, inputs=inputs, robots=wanted.robots or None)
     page = view or None
-    refuse_beside("view", page, port=port, gdb=gdb, ros=ros, inputs=inputs, foxglove=foxglove)
+    refuse_beside("view", page, port=port, ros=ros, inputs=inputs, foxglove=foxglove)
     if is_sweep(wanted, seeds=seeds, seed=seed, port=port):
         alone = {
             "port": port,
@@ -295,11 +298,11 @@ def run(
     # Who looks on from outside lives in real time.
     pace = None if page else realtime or (None if ros is None and foxglove is None else 1.0)
     with RunDisplay() as display:
-        if wanted.robots and view and measured is None:
+        if wanted.robots and view and measured is None and gdb is None:
             result = run_viewed_fleet(wanted, folder, realtime or 1.0, display, force=force, is_opened=not no_browser)
-        elif gdb is None:
+        elif gdb is None or view:
             with (
-                viewed(wanted, realtime or 1.0, display, names, is_opened=not no_browser) if view
+                viewed(wanted, realtime or 1.0, display, names, is_opened=not no_browser, gdb=gdb) if view
                 else driven(wanted, ros=ros, inputs=inputs, foxglove=foxglove, origins=foxglove_origin or ())
             ) as driver:  # fmt: skip
                 result = run_scenario(
@@ -370,16 +373,24 @@ def driven(
 
 @contextlib.contextmanager
 def viewed(
-    scenario: Scenario, speed: float, display: RunDisplay, variables: Sequence[str] = (), *, is_opened: bool
+    scenario: Scenario,
+    speed: float,
+    display: RunDisplay,
+    variables: Sequence[str] = (),
+    *,
+    is_opened: bool,
+    gdb: int | None = None,
 ) -> Iterator[RunBench]:
     """Yield what runs a bench while a page shows and controls it, at first at a speed and with some variables.
 
     Raises:
         UsageError, MissingDependencyError: As of `shown`.
+        BluePillError: The port for GDB beside it is taken.
     """
-    live = LiveRun(scenario, speed=speed, variables=variables, on_wait=display.raise_if_interrupted)
-    with shown(live.source, is_opened=is_opened):
-        yield live.drive
+    with gdb_port(gdb, scenario) as port:
+        live = LiveRun(scenario, speed=speed, variables=variables, on_wait=display.raise_if_interrupted, gdb=port)
+        with shown(live.source, is_opened=is_opened):
+            yield live.drive
 
 
 def run_viewed_fleet(

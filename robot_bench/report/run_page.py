@@ -103,10 +103,11 @@ def lead_of(meta: Json) -> str:
     )
     parts = [
         f"firmware {meta.get('firmware', '?')}",
-        f"world {world.get('name', '?')}",
-        f"{meta.get('body', '?')} body",
-        path,
-        f"seed {meta.get('seed', '?')}",
+        *(
+            [f"world {world.get('name', '?')}", f"{meta.get('body', '?')} body", path, f"seed {meta.get('seed', '?')}"]
+            if world
+            else ["a BluePill by itself"]
+        ),
     ]
     return " · ".join(part for part in parts if part)
 

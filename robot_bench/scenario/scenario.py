@@ -36,7 +36,7 @@ from robot_bench.scenario.options import (
 from robot_bench.scenario.sweep import SweptParameter
 from robot_bench.scenario.tables import InWorldTable
 from robot_bench.scenario.trigger_script import Trigger
-from robot_bench.scenario.wired_robots import OwnRobot
+from robot_bench.scenario.wired_robots import NO_ROBOT, OwnRobot
 from robot_bench.scenario.world_script import ScriptedChange
 from robot_bench.wires.power_up import ZEROS
 from simbase.errors import UsageError
@@ -129,6 +129,11 @@ class Scenario:
     def threshold_m(self) -> float:
         """The distance below which something counts as an obstacle, metres."""
         return self.threshold_um / 1e6
+
+    @property
+    def has_robot(self) -> bool:
+        """Whether a robot stands at the far end of its wires, in a world."""
+        return self.own_robot is None or self.own_robot.kind != NO_ROBOT
 
     @property
     def own_classes(self) -> dict[str, str]:

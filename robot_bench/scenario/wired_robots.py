@@ -50,6 +50,10 @@ class WiredPart(Timed, Protocol):
     on_ranges: Callable[[Nanos, Sequence[float]], None] | None
 
 
+#: The kind of what is no robot: the pins of a board by itself.
+NO_ROBOT = "none"
+
+
 @dataclass(frozen=True, slots=True)
 class _Kind:
     #: Reads a file's table: (table, place, pins).

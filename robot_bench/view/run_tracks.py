@@ -96,8 +96,9 @@ class RunTracks:
         self._threshold_m = cast("float | None", meta.get("threshold_m"))
         self._step_mps = float(cast("float", meta.get("step_mps") or STEP_MPS))
         pins = cast("dict[str, str]", meta.get("pins") or {})
-        self._labels = {net: f"{pin} {net}" for net, pin in pins.items()} | pin_labels()
+        self._labels = {net: f"{pin} {net}" if pin != net else net for net, pin in pins.items()} | pin_labels()
         self._groups = {net: title for title, nets in grouped(list(pins)) for net in nets}
+        self._groups |= {net: f"port {pin[1]}" for net, pin in pins.items() if pin == net}
         self._levels: dict[str, int] = {}
         self._packets = _packets_of(str(self._robot.get("name", "")))
         self._is_whole, self._unread = is_whole, list[Packet]()

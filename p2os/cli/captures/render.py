@@ -24,10 +24,10 @@ from simbase.files import writing
 from simbase.timing import NS_PER_S, Nanos
 from simbase.units import FACTOR, TIME
 
-HELP = """Draw a run, or a capture, as a picture or a film.
+HELP = """Draw a run or capture as a picture or film.
 
-The page of `p2os view` draws it, in a Chromium or Chrome without a window. What comes
-out is what the file's ending says: png, svg (the plan), gif (needs Pillow) or mp4
+The page of `p2os view` draws it in a Chromium or Chrome without a window. The
+file's ending selects the format: png, svg (the plan), gif (needs Pillow) or mp4
 (needs ffmpeg).
 
 \b

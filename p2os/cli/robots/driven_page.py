@@ -13,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Protocol
 
+from p2os.cli.robots.command_queue import CommandQueue
 from p2os.cli.robots.drive_deadman import DriveDeadman
 from p2os.client import Link
 from p2os.client.notices import DeadmanStopped, GapStopped, LinkLost, LinkLostError, MotorsDisabled, Notice
@@ -22,8 +23,6 @@ from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: chosen: how often the line is renewed.
 TURN_NS: Nanos = 50 * NS_PER_MS
-#: chosen: commands that may wait; a page sends ten a second.
-MOST_COMMANDS = 64
 STOPPED = "stopped: let go of what is held, and press anew"
 
 
@@ -55,7 +54,7 @@ class PageDriver:
 
     def __init__(self, most_mps: float, most_dps: float, clock: Clock = wall_clock) -> None:
         self._deadman, self._clock = DriveDeadman(most_mps, most_dps), clock
-        self._commands: queue.SimpleQueue[RunCommand] = queue.SimpleQueue()
+        self._commands = CommandQueue()
         self._state = RunState(is_running=True, why="the robot stands")
         self._notices: queue.SimpleQueue[Notice] = queue.SimpleQueue()
         self._gaps = GapWatch(clock())
@@ -69,11 +68,7 @@ class PageDriver:
 
     def offer(self, command: RunCommand) -> bool:
         """Take a command; False where too many wait, but for those that stop."""
-        is_stop = command.do == "stop" or (command.do == "drive" and not command.forward_mps and not command.turn_dps)
-        if self._commands.qsize() >= MOST_COMMANDS and not is_stop:
-            return False
-        self._commands.put(command)
-        return True
+        return self._commands.offer(command)
 
     def offered(self, _begun: str) -> tuple[str, ...]:
         """Return names of variables: nobody sees into the program of a robot that is there."""
@@ -93,10 +88,7 @@ class PageDriver:
     def turn(self, client: PageDrivenClient, wait_ns: Nanos = TURN_NS) -> None:
         """Wait for a command, no longer than a turn; have the robot drive as is wanted then."""
         self._gaps.expect(self._clock() + wait_ns)
-        try:
-            command: RunCommand | None = self._commands.get(timeout=wait_ns / NS_PER_S)
-        except queue.Empty:
-            command = None
+        command = self._commands.take(wait_ns / NS_PER_S)
         now = self._clock()
         if self._gaps.gap(now):
             self._deadman.stop()  # this machine slept: what waited means nothing, but for stops

@@ -32,6 +32,7 @@ from p2os.cli.keyboard import raw_keyboard
 from p2os.cli.names import ReportedModel, RobotUrl
 from p2os.cli.quantities import option
 from p2os.cli.robots.pad_source import SdlPad
+from p2os.cli.robots.page_stop import PageStop
 from p2os.cli.robots.viewed_robot import opened_for
 from p2os.client import Link, Robot
 from p2os.client.notices import DeadmanStopped, GapStopped, LinkLostError, Notice
@@ -42,11 +43,11 @@ from simbase.errors import UsageError
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 from simbase.units import SPEED, TURN_RATE
 
-HELP = """Drive a robot with the keyboard, or with a game pad.
+HELP = """Drive a robot with the keyboard or a game pad.
 
-Hold a key to drive; let it go and the robot stops. So it does when the terminal
-hangs, the link is lost, the machine sleeps, or anything ends the program: a key
-must be pressed anew then.
+Hold a key to drive; release it to stop. The robot also stops when the terminal
+closes, the link is lost, the machine sleeps or the program ends. Press a key
+again to continue.
 
 \b
 Keys:
@@ -61,6 +62,8 @@ Examples:
   p2os teleop tcp:127.0.0.1:8101
   p2os teleop serial:/dev/ttyUSB0 --vel 150mm/s --turn-rate 20deg/s
   p2os teleop tcp:127.0.0.1:8101 --pad
+
+With --view, STOP stands on the page in the browser, and Escape there is the same.
 
 With --pad: Up connects, Down releases it, R2 drives ahead, L2 back, the right stick
 turns; a pad that goes away stops the robot within 200 ms.
@@ -135,18 +138,19 @@ def teleop(
     no_browser: NoBrowser = False,
 ) -> None:
     """Drive by keyboard or pad."""
+    stop = PageStop()
 
     @contextlib.contextmanager
     def connected() -> Iterator[Robot]:
         with (
-            opened_for(url, robot, is_viewed=view, is_opened=not no_browser) as opener,
+            opened_for(url, robot, is_viewed=view, is_opened=not no_browser, stop=stop) as opener,
             held(Robot(url, model=robot or None, opener=opener), moves=True) as client,
         ):
             say_what_is_beyond(client.limits, speed_mps=vel, rate_radps=turn_rate)
             yield client
 
     if pad:
-        drive_by_pad(connected, (vel or PAD_MPS, turn_rate or PAD_RADPS))
+        drive_by_pad(connected, (vel or PAD_MPS, turn_rate or PAD_RADPS), stop)
         return
     if not sys.stdin.isatty():
         raise UsageError("there is no keyboard: stdin is not a terminal", hint="p2os drive URL --vel 0.2m/s --for 2s")
@@ -154,7 +158,7 @@ def teleop(
         sys.stderr.write("hold arrows or w a s d to drive, space stops, + - change the speed, q ends\r\n")
         most = client.limits
         keys = Teleop(min(vel or KEY_MPS, most.forward_mps), min(turn_rate or KEY_RADPS, most.turn_radps))
-        loop = KeyLoop(keys, client)
+        loop = KeyLoop(keys, client, stop=stop)
         try:
             while not loop.keys.is_over:
                 loop.turn()
@@ -162,7 +166,9 @@ def teleop(
             sys.stderr.write("\r\n")
 
 
-def drive_by_pad(connect: Callable[[], AbstractContextManager[Robot]], fastest: tuple[float, float]) -> None:
+def drive_by_pad(
+    connect: Callable[[], AbstractContextManager[Robot]], fastest: tuple[float, float], stop: PageStop
+) -> None:
     """Drive by the first game pad of this machine."""
     hold_robot()
     with SdlPad() as pad:
@@ -174,6 +180,7 @@ def drive_by_pad(connect: Callable[[], AbstractContextManager[Robot]], fastest: 
             clock=wall_clock,
             wait=lambda span_ns: time.sleep(span_ns / NS_PER_S),
             report=lambda text: print(text, file=sys.stderr),  # noqa: T201 - the I/O layer
+            stop=stop,
         ).run()
 
 
@@ -193,6 +200,17 @@ class Teleop:
         self._key = ""
         self._pressed_ns: Nanos = 0
         self._until: Nanos | None = None
+        #: Until when keys that drive mean nothing, unless one comes before: then that much longer.
+        self._deaf_until: Nanos | None = None
+
+    @property
+    def is_stopped(self) -> bool:
+        """Whether what is held means nothing until it was let go."""
+        return self._deaf_until is not None
+
+    def stop(self, now: Nanos) -> None:
+        """Stand, until no key was held for as long as a keyboard takes to begin to repeat."""
+        self._until, self._key, self._deaf_until = None, "", now + FIRST_HOLD_NS
 
     @property
     def is_driving(self) -> bool:
@@ -218,6 +236,8 @@ class Teleop:
             self.share = min(FASTEST, self.share * FACTOR)
         elif key in {"-", "_"}:
             self.share = max(SLOWEST, self.share / FACTOR)
+        elif key in KEYS and self._deaf_until is not None:
+            self._deaf_until = now + FIRST_HOLD_NS
         elif key in KEYS:
             is_repeated = key == self._key and now - self._pressed_ns < REPEAT_NS
             hold = NEXT_HOLD_NS if is_repeated else FIRST_HOLD_NS
@@ -232,6 +252,8 @@ class Teleop:
         """Stop if no key came in time."""
         if self._until is not None and now >= self._until:
             self._until = None
+        if self._deaf_until is not None and now >= self._deaf_until:
+            self._deaf_until = None
 
 
 class KeyLoop:
@@ -245,6 +267,7 @@ class KeyLoop:
         client: The robot.
         read: Returns the keys that came within so many nanoseconds.
         clock: Nanoseconds that never run back.
+        stop: The button on its page; what is held then means nothing until it was let go.
     """
 
     def __init__(
@@ -254,7 +277,9 @@ class KeyLoop:
         *,
         read: Callable[[Nanos], list[str]] | None = None,
         clock: Clock = wall_clock,
+        stop: PageStop | None = None,
     ) -> None:
+        self._stop = stop or PageStop()
         self.keys = keys
         self._client = client
         self._read = read_keys if read is None else read
@@ -273,7 +298,10 @@ class KeyLoop:
             pressed = [" ", *(key for key in pressed if key in QUIT_KEYS)]
         for key in pressed:
             self.keys.press(key, now)
+        if self._stop.take():
+            self.keys.stop(now)
         self.keys.advance_to(now)
+        self._stop.drives(is_driving=self.keys.is_driving)
         try:
             self._client.set_velocity(*self.keys.speeds)
         except LinkLostError:  # looked for again by the client; nothing moves meanwhile, nor at once afterwards
@@ -286,7 +314,8 @@ def status(keys: Teleop, client: Robot) -> str:
     if client.link is not Link.OPEN:
         return f"link: {client.link.value}"
     state, (forward_mps, turn_radps) = client.state, keys.speeds
-    doing = "STALL" if state.is_stalled else "DRIVE" if keys.is_driving else "stand"
+    standing = "STOP " if keys.is_stopped else "stand"
+    doing = "STALL" if state.is_stalled else "DRIVE" if keys.is_driving else standing
     return (
         f"{doing} {forward_mps:+.2f} m/s {math.degrees(turn_radps):+.0f} deg/s "
         f"({keys.share:.0%})  x {state.pose.x_m:.2f} m  y {state.pose.y_m:.2f} m  "
@@ -348,6 +377,7 @@ class PadDriver:
         clock: Returns the time, nanoseconds.
         wait: Lets so many nanoseconds pass.
         report: Called with one line at each change.
+        stop: The button on its page.
     """
 
     def __init__(
@@ -359,7 +389,9 @@ class PadDriver:
         clock: Callable[[], Nanos],
         wait: Callable[[Nanos], None],
         report: Callable[[str], None],
+        stop: PageStop | None = None,
     ) -> None:
+        self._stop = stop or PageStop()
         self._reports, self._connect, self._fastest = reports, connect, fastest
         self._clock, self._wait, self._report = clock, wait, report
         self._pad = Gamepad()
@@ -384,7 +416,13 @@ class PadDriver:
         stops: deque[Notice] = deque()
         robot.on_event(lambda notice: stops.append(notice) if is_stop(notice) else None)
         gaps = GapWatch(self._clock())
+        self._stop.take()  # one that nobody was driven at means nothing
+        self._stop.drives(is_driving=True)
         while True:
+            if self._stop.take():
+                _stop(robot)
+                self._pad.lose()
+                return "STOP was pressed on the page"
             if (gap_ns := gaps.gap(self._clock())) or stops:
                 _stop(robot)
                 self._pad.lose()

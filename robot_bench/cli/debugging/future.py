@@ -37,12 +37,16 @@ MOST_POINTS = 512
 SLICE_NS: Nanos = 20 * NS_PER_MS
 
 
+_AT_POINT, _STEPPED = HaltReason(StopKind.BREAKPOINT), HaltReason(StopKind.STEP)
+
+
 @dataclass(frozen=True, slots=True)
 class Halted:
-    """Why a future stands still: the point's number (0: none of the list), and a line."""
+    """Why a future stands still: the point's number (0: none of the list), and a line; and as a debugger knows it."""
 
     number: int
     why: str
+    stop: HaltReason = _AT_POINT
 
 
 @dataclass(slots=True)
@@ -253,18 +257,19 @@ class Future:
             return None
         self.head_ns = self._stood_ns = self.now_ns
         if stop.kind is StopKind.END:
-            return Halted(0, "the end of the run")
+            return Halted(0, THE_END, stop)
         return self._halted_by(stop)
 
     def _halted_by(self, stop: HaltReason) -> Halted:
         pc = self.machine.board.pc
         for number, point in self._points.items():
             is_there = pc in point.breakpoints if stop.kind is StopKind.BREAKPOINT else any(
-                stop.address is not None and one.sees(stop.address, 4, is_read=False) for one in point.watched
+                stop.address is not None and one.sees(stop.address, 4, is_read=is_read)
+                for one in point.watched for is_read in (False, True)
             )  # fmt: skip
             if is_there:
-                return Halted(number, point.words)
-        return Halted(0, "")
+                return Halted(number, point.words, stop)
+        return Halted(0, "", stop)
 
     def _halt_at(self, hit: tuple[Nanos, int, str]) -> Halted:
         at, number, what = hit
@@ -285,8 +290,8 @@ class Future:
     def step(self) -> Halted:
         """Run one instruction of the program."""
         with self._unarmed():
-            self.execution.step()
-        return self._stand("")
+            stop = self.execution.step()
+        return self._stand(THE_END if stop.kind is StopKind.END else "", stop)
 
     def step_line(self) -> Halted:
         """Run to where another line of the source begins."""
@@ -295,7 +300,7 @@ class Future:
                 stop = self.execution.run_to(self.now_ns + SAMPLE_NS)
                 if stop.kind is not StopKind.INTERRUPT:
                     break
-        return self._stand("the end of the run" if stop.kind is StopKind.END else "")
+        return self._stand(THE_END if stop.kind is StopKind.END else "")
 
     def do_by_hand(self, words: str) -> None:
         """Do what words mean at the first moment that nothing is known of yet, up to 50 ms from here, and go there.
@@ -338,7 +343,13 @@ class Future:
         """Go to before the last instruction."""
         with self._unarmed(), self._quiet():
             stop = self.execution.step_back()
-        return self._stand(_BEGIN if stop.kind is StopKind.BEGIN else "")
+        return self._stand(_BEGIN if stop.kind is StopKind.BEGIN else "", stop)
+
+    def go_back(self) -> Halted:
+        """Go to the last line or variable that it halts at before this moment, or to where this future begins."""
+        with self._quiet():
+            stop = self.execution.go_back()
+        return self._stand(_BEGIN if stop.kind is StopKind.BEGIN else "", stop)
 
     def step_line_back(self) -> Halted:
         """Go to where the program came to the line before."""
@@ -416,13 +427,13 @@ class Future:
             yield
             self.machine.restore(snapshot)
 
-    def _stand(self, why: str) -> Halted:
+    def _stand(self, why: str, stop: HaltReason = _STEPPED) -> Halted:
         """Stand still where the chip is."""
         self.head_ns = self._stood_ns = self.now_ns
         self._hits.clear()
         self.look_ahead()
         self._hits.clear()
-        return Halted(0, why)
+        return Halted(0, why, stop)
 
     @contextlib.contextmanager
     def _unarmed(self) -> Iterator[None]:
@@ -457,4 +468,4 @@ class Future:
 
 #: The number of what a step halts at.
 _STEP = -1
-_BEGIN = "the beginning"
+_BEGIN, THE_END = "the beginning", "the end of the run"

@@ -1,14 +1,16 @@
 """`p2os run --gdb`: a scenario under GDB, with robot and world standing still at each halt."""
 
+import contextlib
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
-from bluepill_sim.cli.gdb_server import GdbServer
+from bluepill_sim.cli.gdb_server import GdbPort, GdbServer
 from p2os.errors import RunFailedError
 from robot_bench.bench import Bench
 from robot_bench.cli.debugging.machine import BenchMachine, RemoteMachine
 from robot_bench.remote import RemoteBench
 from robot_bench.run import RunBench, RunRemoteBench
+from robot_bench.scenario.scenario import Scenario
 
 
 def debug_bench(port: int, *, is_paced: bool, on_wait: Callable[[], None]) -> RunBench:
@@ -41,11 +43,29 @@ def debug_port(port: int, *, on_wait: Callable[[], None]) -> RunRemoteBench:
     return drive
 
 
+@contextlib.contextmanager
+def gdb_port(port: int | None, scenario: Scenario) -> Iterator[GdbPort | None]:
+    """Yield where GDB comes to a run that a page controls, too, and print it; None: it does not come.
+
+    Raises:
+        BluePillError: The port is taken.
+    """
+    if port is None:
+        yield None
+        return
+    with contextlib.closing(GdbPort(port)) as opened:
+        say_where(opened.port, scenario)
+        yield opened
+
+
+def say_where(port: int, scenario: Scenario) -> None:
+    """Print to standard error where GDB is waited for, and how one starts it."""
+    sys.stderr.write(f"waiting for GDB on port {port}: gdb-multiarch {scenario.firmware} -ex 'target remote :{port}'\n")
+    sys.stderr.flush()
+
+
 def _serve(server: GdbServer, bench: Bench | RemoteBench) -> None:
-    firmware = bench.scenario.firmware
-    sys.stderr.write(
-        f"waiting for GDB on port {server.port}: gdb-multiarch {firmware} -ex 'target remote :{server.port}'\n"
-    )
+    say_where(server.port, bench.scenario)
     try:
         runs_on = server.serve()
     finally:

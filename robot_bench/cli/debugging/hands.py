@@ -11,7 +11,11 @@ from robot_bench.bench import Bench
 from robot_bench.scenario.hands.actions import WHEELS
 from robot_bench.scenario.hands.timed import Hand, hand_at
 from robot_bench.scenario.hands.words import meant_by
+from simbase.errors import UsageError
 from simbase.timing import Nanos
+
+#: What hands do to a board.
+BOARD_HANDS = frozenset({"set_pin", "set_volts", "type", "let_go"})
 
 
 def hand_of(words: str, at: Nanos, bench: Bench) -> Hand:
@@ -24,6 +28,8 @@ def hand_of(words: str, at: Nanos, bench: Bench) -> Hand:
     do, keys = meant_by(words)
     scenario = bench.scenario
     wires = None if scenario.own_robot is None else scenario.own_robot.wires
+    if not scenario.has_robot and do not in BOARD_HANDS:
+        raise UsageError("a board by itself has neither robot nor world", hint="pin, volts, type, let go")
     found = hand_at(at, do, keys, scenario.parameters, "hand", wires)
     if found.doing.faults and bench.parts.controller is None:
         raise ScenarioError(

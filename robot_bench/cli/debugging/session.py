@@ -8,10 +8,13 @@ at its time, and nobody looking; only a fork is another run.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import count
 from pathlib import Path
 from typing import Protocol
 
+from bluepill_sim.core import Watchpoint
+from bluepill_sim.debug.machine import HaltReason, StopKind
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.program.variables import Variable, read_variables
 from p2os.view.run_control import (
@@ -24,8 +27,9 @@ from p2os.view.run_control import (
     RunState,
 )
 from robot_bench.bench import Bench
-from robot_bench.cli.debugging.future import SLICE_NS, Future, Halted
+from robot_bench.cli.debugging.future import SLICE_NS, THE_END, Future, Halted
 from robot_bench.cli.debugging.hands import drive_words, driven_by
+from robot_bench.cli.debugging.holds import Holds
 from robot_bench.cli.debugging.points import HaltPoint, point_of
 from robot_bench.events.words import distinguishing_words, what_of
 from robot_bench.recording.divergence import Difference, differences
@@ -45,6 +49,11 @@ MOST_SIGNALS = 8
 MOST_HANDS = 20
 #: What is done beside a run that goes on: where it cannot be, the run goes on.
 _BESIDE = frozenset({"hand", "drive", "stop", "save"})
+#: What moves the run to another place: GDB cannot be notified while it stands at its prompt.
+_MOVES = frozenset({"go", "step", "back", "fork", "choose", "drop", "compare", "hand"})
+GDB_STANDS = "GDB stands at this halt, and what it shows has to stay: continue there first, and it waits for this page"
+#: Number and words of what GDB halts at, among the places of the page.
+GDB, GDB_WORDS = -2, "GDB"
 #: chosen: slower than this, what happens is looked for ahead of the time that is shown: else it would come late.
 _SLOW = 0.25
 #: chosen: a bench that cannot keep the pace goes on from where it is after so long, ns of the clock.
@@ -81,12 +90,20 @@ class RunSession:
         recorder: Records its futures.
         folder: Where traces of forks are kept.
         speed: Virtual seconds a second; 0 as fast as it goes.
+        waits_for_gdb: Where it stands at first until GDB comes, or the page lets it go: what is said then.
     """
 
-    def __init__(self, bench: Bench, recorder: FutureRecorder, folder: Path, speed: float = 1.0) -> None:
+    def __init__(
+        self, bench: Bench, recorder: FutureRecorder, folder: Path, speed: float = 1.0, waits_for_gdb: str = ""
+    ) -> None:
         self._recorder, self._folder = recorder, folder
         self.speed = speed
-        self.is_running = True
+        self.holds = Holds(waits_for_gdb=bool(waits_for_gdb))
+        self.is_running = not waits_for_gdb
+        #: What GDB halts at; what it has asked for that waits for the page; how the run has come to stand for it.
+        self._gdb_point = HaltPoint(words=GDB_WORDS)
+        self._asked: Callable[[Future], Halted] | None = None
+        self._gdb_halt: Halted | None = None
         self._main = self._chosen = Future(MAIN, bench)
         self._futures = {MAIN: self._main}
         #: Those that were dropped, too: others come from them.
@@ -96,7 +113,7 @@ class RunSession:
         self._counts: dict[int, int] = {}
         self._variables: dict[str, Variable] = {}
         self._compared: dict[str, tuple[str, Nanos, tuple[PartingState, ...]]] = {}
-        self._why, self._trouble, self._done, self._saved = "", "", 0, ""
+        self._why, self._trouble, self._done, self._saved = waits_for_gdb, "", 0, ""
         #: How somebody drives the robot, m/s and deg/s, as far as the run goes on; None: nobody does.
         self._speeds: tuple[float, float] | None = None
         self._reported_at: Nanos | None = None
@@ -163,29 +180,126 @@ class RunSession:
     def do(self, command: RunCommand) -> None:
         """Do what a page asks for; what cannot be done is said in the state."""
         self._state, self._reported_at, self._base, self._trouble, self._saved = None, None, None, "", ""
+        was_going = self._is_going
         try:
+            if self.holds.is_shown_to_gdb and self._moves(command):
+                raise UsageError(GDB_STANDS)
             self._doing[command.do](command)
         except (P2osError, BluePillError) as error:
             hint = getattr(error, "hint", None)
             self._trouble = f"{error} ({hint})" if hint else str(error)
-            if command.do not in _BESIDE:
+            if command.do not in _BESIDE and not self.holds.is_shown_to_gdb:
                 self._stop("")
+        if was_going and not self._is_going:
+            self._tell_gdb(Halted(0, self._why, HaltReason(StopKind.INTERRUPT)))
         self._done += 1
         self._state = None
 
+    @property
+    def _is_going(self) -> bool:
+        """Whether time goes on by itself: not for a step."""
+        return self.is_running and not self._is_step
+
+    def _moves(self, command: RunCommand) -> bool:
+        if command.do == "halt_at":  # an event is looked for from a little before on
+            return command.words.split()[:1] not in (["line"], ["variable"])
+        return command.do in _MOVES or (command.do == "run" and command.at_ns not in {None, self._chosen.head_ns})
+
     def _run(self, command: RunCommand) -> None:
         self._go(command)
-        if self._chosen.is_over:
-            self._stop("the end of the run")
-            return
-        self._chosen.resume()
-        self.is_running, self._why = True, ""
-        self._drive_on()
+        self._set_off()
+
+    def _set_off(self) -> None:
+        """Let the chosen future go as far as the page is concerned; do what GDB has asked for, or go on."""
+        self.holds.page_runs()
+        if self._go_on_for_both():
+            self._drive_on()
+
+    def _go_on_for_both(self) -> bool:
+        """Do what GDB has asked for, or go on, where neither holds; return whether it goes on."""
+        self._state, self._base = None, None
+        if self._chosen.is_over and self._asked is None:
+            self._stop(THE_END)
+            self._tell_gdb(Halted(GDB, THE_END, HaltReason(StopKind.END)))
+            return False
+        if not self.holds.is_free:
+            gdb = "GDB holds it: continue there" if self.holds.by_gdb else "GDB waits until it goes on here"
+            self.is_running, self._why = False, gdb
+            return False
+        asked, self._asked = self._asked, None
+        if asked is not None:
+            self._stand_for_gdb(asked(self._chosen))
+        else:
+            self._chosen.resume()
+            self.is_running, self._why = True, ""
+        return self.is_running
+
+    # As GDB asks for, beside the page.
+
+    def do_for_gdb(self, ask: Callable[[Future], Halted] | None) -> None:
+        """Do what GDB asks for, or go on (None), as soon as the page lets it; `take_gdb_halt` says when it stands."""
+        self.holds.gdb_continues()
+        self._asked = ask
+        if self._go_on_for_both():
+            self._drive_on()
+
+    def stand_for_gdb(self, why: str) -> None:
+        """Stand still where it is, for GDB."""
+        if self.is_running:
+            self._chosen.go_to(self._chosen.head_ns)
+        self._stand_for_gdb(Halted(GDB, why, HaltReason(StopKind.INTERRUPT)))
+
+    def gdb_comes(self) -> None:
+        """Stand still where it is: GDB begins at a halt."""
+        self.stand_for_gdb(GDB_WORDS)
+        self.holds.gdb_comes()
+
+    def gdb_leaves(self, *, is_lost: bool) -> None:
+        """Take that GDB is there no more: what it halts at is gone; a lost line lets nothing go."""
+        self.holds.gdb_leaves(is_lost=is_lost)
+        self._asked = self._gdb_halt = None
+        self.halt_for_gdb(frozenset(), frozenset())
+        if is_lost:
+            self._why, self._state = "GDB has gone without detaching", None
+        elif not self.is_running:
+            self._go_on_for_both()
+
+    def halt_for_gdb(self, breakpoints: frozenset[int], watched: frozenset[Watchpoint]) -> None:
+        """Halt at these places for GDB, and at no others."""
+        self._gdb_point = HaltPoint(words=GDB_WORDS, breakpoints=breakpoints, watched=watched)
+        self._chosen.arm(self._armed)
+
+    def take_gdb_halt(self) -> Halted | None:
+        """Return why it stands still for GDB, which waits for that; once."""
+        halted, self._gdb_halt = self._gdb_halt, None
+        return halted
+
+    def _stand_for_gdb(self, halted: Halted) -> None:
+        """Stand still for GDB, whatever the page wants."""
+        self.is_running, self._is_step, self._state, self._asked = False, False, None, None
+        self._why = f"{GDB_WORDS}: {halted.why}" if halted.why and halted.why != GDB_WORDS else GDB_WORDS
+        self._chosen.forget_step()
+        self._tell_gdb(replace(halted, number=GDB))
+
+    def _tell_gdb(self, halted: Halted) -> None:
+        if self.holds.stands():
+            self._gdb_halt = halted
+
+    @property
+    def _armed(self) -> dict[int, HaltPoint]:
+        """Where the chosen future halts: for the page, and for GDB."""
+        point = self._gdb_point
+        return self._points | ({GDB: point} if point.breakpoints or point.watched else {})
+
+    # As the page asks for.
 
     def _pause(self, _command: RunCommand) -> None:
+        self.holds.page_holds()
         if self.is_running:
             self._stop("paused")
             self._chosen.go_to(self._chosen.head_ns)
+        elif self.holds.is_shown_to_gdb:
+            self._why = "paused; GDB holds it, too"
 
     def _go(self, command: RunCommand) -> None:
         """Stand still at the time of a command."""
@@ -201,7 +315,7 @@ class RunSession:
         self._go(command)
         future = self._chosen
         if future.is_over:
-            self._stop("the end of the run")
+            self._stop(THE_END)
         elif command.unit == "instruction":
             self._stop(future.step().why)
         elif command.unit == "line":
@@ -261,8 +375,8 @@ class RunSession:
             if not was_running:
                 self._chosen.stand()
         if was_running:
-            self._chosen.resume()
-            self.is_running, self._why = True, ""
+            self.holds.page_runs()
+            self._go_on_for_both()
         if command.words.split()[:1] in (["drive"], ["let"]):
             self._speeds = driven_by(self._chosen.hands, self._chosen.now_ns)
 
@@ -290,7 +404,7 @@ class RunSession:
         self._stop("")
         self._chosen.arm({})
         self._chosen = future
-        future.arm(self._points)
+        future.arm(self._armed)
         future.go_to(future.head_ns)
 
     def _drop(self, command: RunCommand) -> None:
@@ -343,7 +457,7 @@ class RunSession:
             return
         number = next(self._places)
         self._points[number], self._counts[number] = point, 0
-        self._chosen.arm(self._points)
+        self._chosen.arm(self._armed)
         if not self.is_running and point.selector is not None:
             # It sees what was before from the last older state on: a robot that is there already does not come there.
             self._chosen.go_to(self._chosen.head_ns - 1)
@@ -353,7 +467,7 @@ class RunSession:
         if self._points.pop(command.number, None) is None:
             raise UsageError(f"there is no place {command.number} to halt at", hint="it may be gone")
         del self._counts[command.number]
-        self._chosen.arm(self._points)
+        self._chosen.arm(self._armed)
 
     def watch(self, names: Sequence[str]) -> None:
         """Look at these variables of the program from now on, too.
@@ -393,6 +507,7 @@ class RunSession:
 
     def _stop(self, why: str) -> None:
         self.is_running, self._why, self._is_step = False, why, False
+        self.holds.page_holds()
         self._chosen.forget_step()
 
     _is_step = False
@@ -440,9 +555,15 @@ class RunSession:
         return due
 
     def _halted(self, halted: Halted) -> None:
+        if halted.number == GDB:
+            self._stand_for_gdb(replace(halted, why=halted.stop.kind.value))
+            return
         if halted.number in self._counts:
             self._counts[halted.number] += 1
+        was_going = self._is_going
         self._stop(halted.why)
+        if was_going:
+            self._tell_gdb(halted)
 
     def end(self) -> None:
         """Bring the run itself to where it was furthest, for whoever ends it there."""

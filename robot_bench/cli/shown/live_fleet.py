@@ -6,10 +6,10 @@ are no forks and no hands.
 Invariant: the traces are those of robots at which nobody looks.
 """
 
-import queue
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from p2os.cli.robots.command_queue import CommandQueue
 from p2os.transport.wall_clock import Clock, wall_clock
 from p2os.view.header import PageHeader, PageSection, PanelHeader, PanelState
 from p2os.view.live import LiveRecording
@@ -25,8 +25,6 @@ from robot_bench.scenario.scenario import Scenario
 from robot_bench.view.run_tracks import RunTracks, add_events
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
-#: chosen: commands that may wait; a person gives some a second.
-MOST_COMMANDS = 64
 #: chosen: of the clock, between two looks at what is asked for.
 SLICE_NS: Nanos = NS_PER_S // 50
 #: chosen: robots that cannot keep the pace go on from where they are after so long, ns of the clock.
@@ -71,7 +69,7 @@ class LiveFleet:
         self._blocks: dict[str, Blocks] = {}
         self._on_wait, self._clock = on_wait, clock
         self._end_ns = scenario.duration_ns
-        self._commands: queue.SimpleQueue[RunCommand] = queue.SimpleQueue()
+        self._commands = CommandQueue()
         self._state = RunState(is_running=True, speed=speed)
         self._panels = LookedPanels(())
         #: Until when it runs though it stands still: a step; and the clock and the time at which its pace began.
@@ -90,10 +88,7 @@ class LiveFleet:
 
     def offer(self, command: RunCommand) -> bool:
         """Take a command; False where too many wait."""
-        if self._commands.qsize() >= MOST_COMMANDS:
-            return False
-        self._commands.put(command)
-        return True
+        return self._commands.offer(command)
 
     def offered(self, begun: str) -> Sequence[str]:  # noqa: ARG002 - as of `RunControl`
         """Variables are looked at of a robot alone."""
@@ -146,11 +141,8 @@ class LiveFleet:
         self._show(replace(state, head_ns=first.now))
         if wait_s:
             self._on_wait()
-        try:
-            command = self._commands.get(block=wait_s > 0, timeout=wait_s or None)
-        except queue.Empty:
-            return
-        self._show(replace(self._done(command, first.now), done=self._state.done + 1))
+        if (command := self._commands.take(wait_s)) is not None:
+            self._show(replace(self._done(command, first.now), done=self._state.done + 1))
 
     def _go_on(self, first: Bench, now: Nanos, speed: float) -> float:
         """Run as far as the pace has come; return for how many seconds nothing is to be done."""

@@ -9,7 +9,6 @@ Invariant: nobody who looks on decides anything: the trace is the same with and 
 """
 
 import os
-import queue
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -17,9 +16,11 @@ from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from bluepill_sim.cli.gdb_server import GdbPort
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.program.image import load_image
 from bluepill_sim.program.variables import VariableTable, read_variables
+from p2os.cli.robots.command_queue import CommandQueue
 from p2os.cli.robots.drive_deadman import DriveDeadman
 from p2os.transport.wall_clock import Clock, wall_clock
 from p2os.view.header import PageHeader, PanelHeader, PanelState
@@ -29,6 +30,7 @@ from p2os.view.run_control import MOST_DPS, MOST_MPS, RunCommand, RunState
 from p2os.view.targets import panels_of
 from robot_bench.bench import Bench, run_of
 from robot_bench.cli.debugging.future import Future, SeenStretch
+from robot_bench.cli.debugging.gdb_beside import GdbBeside
 from robot_bench.cli.debugging.session import MAIN, RunSession
 from robot_bench.cli.shown.looked_panels import LookedPanels
 from robot_bench.cli.shown.offered_hands import hands_of
@@ -45,8 +47,8 @@ from simbase.errors import UsageError
 from simbase.files import write_text
 from simbase.timing import Nanos
 
-#: chosen: commands that may wait; a person gives some a second.
-MOST_COMMANDS = 64
+#: chosen: how long a command of a page waits at most while GDB is listened for, seconds.
+GDB_WAIT_S = 0.02
 #: chosen: how long a signal may wait to be looked at where a run stands still, seconds.
 _WAIT_S = 0.2
 
@@ -113,6 +115,7 @@ class LiveRun:
         variables: Names of the program's variables that are watched from the beginning.
         on_wait: Called while it stands still; may raise to end the run.
         clock: Wall clock, ns.
+        gdb: Where GDB comes, beside the page: it stands at first until that, or a page lets it go; None: it does not.
     """
 
     def __init__(
@@ -123,7 +126,10 @@ class LiveRun:
         variables: Sequence[str] = (),
         on_wait: Callable[[], None] = lambda: None,
         clock: Clock = wall_clock,
+        gdb: GdbPort | None = None,
     ) -> None:
+        self._gdb_port = gdb
+        self._gdb: GdbBeside | None = None
         self._scenario = scenario
         self._recording = ViewRecording(PageHeader(title=scenario.name, hands=hands_of(scenario)))
         self._tracks: dict[str, RunTracks] = {}
@@ -135,7 +141,7 @@ class LiveRun:
         self._panels = LookedPanels(())
         #: Whose chip the panels show.
         self._shown_bench: Bench | None = None
-        self._commands: queue.SimpleQueue[RunCommand] = queue.SimpleQueue()
+        self._commands = CommandQueue()
         #: How the run stands; None before it has begun.
         self._state = RunState(is_running=True, speed=speed)
         self._session: RunSession | None = None
@@ -158,11 +164,8 @@ class LiveRun:
         return self._state
 
     def offer(self, command: RunCommand) -> bool:
-        """Take a command; False where too many wait."""
-        if self._commands.qsize() >= MOST_COMMANDS:
-            return False
-        self._commands.put(command)
-        return True
+        """Take a command; False where too many wait, but for those that stop."""
+        return self._commands.offer(command)
 
     def offered(self, begun: str) -> Sequence[str]:
         """Return names of variables that what was typed may become."""
@@ -187,9 +190,12 @@ class LiveRun:
         meta = meta_of(bench.scenario, bench.parts.world, run_of(bench).note, is_at_port=False)
         panels = panels_of(bench.chip)
         self.source.offer(BenchBuilt(meta, [one.header for one in panels]), bench.now, is_kept=True)
-        self._run_folder = None if bench.trace.path is None else bench.trace.path.parent
+        has_folder = bench.trace.path is not None and bench.scenario.has_robot
+        self._run_folder = bench.trace.path.parent if has_folder and bench.trace.path is not None else None
         self._folder = TemporaryDirectory(prefix="p2os-view-")
-        session = self._session = RunSession(bench, self, Path(self._folder.name), self._speed)
+        waits = "" if self._gdb_port is None else f"waiting for GDB on port {self._gdb_port.port}"
+        session = self._session = RunSession(bench, self, Path(self._folder.name), self._speed, waits)
+        self._gdb = None if self._gdb_port is None else GdbBeside(session, self._gdb_port)
         session.watch(self._variables)
         self._panels.replace(panels)
         self._shown_bench = bench
@@ -230,11 +236,11 @@ class LiveRun:
         self._show(session.state())
         if wait_s:
             self._on_wait()
-        try:
-            command = self._commands.get(block=wait_s > 0, timeout=wait_s or None)
-        except queue.Empty:
-            return
-        self._do(session, command)
+        if self._gdb is not None:
+            self._gdb.serve(min(wait_s, GDB_WAIT_S))
+            wait_s = 0
+        if (command := self._commands.take(wait_s)) is not None:
+            self._do(session, command)
 
     def _do(self, session: RunSession, command: RunCommand) -> None:
         """Do what was asked for."""

@@ -24,12 +24,13 @@ _USUAL = {"METRES": 0.2, "RATE": 0.001, "VOLTS": 11.0}
 def hands_of(scenario: Scenario) -> HandsOffer:
     """Return what can be done in a run of a scenario."""
     wires = pins_of(scenario)
-    analog = [pin for pin in ANALOG if pin not in wires.values()]
+    analog = [pin for pin in ANALOG if pin not in wires.values() or not scenario.has_robot]
     if scenario.own_robot is not None:
         analog += [wire.pin for wire in scenario.own_robot.robot.signals if wire.is_analog]
     return HandsOffer(
         faults=_faults(scenario), buttons=_buttons(scenario), pins=[*wires], analog_pins=sorted(set(analog)),
-        ports=["usart1", "usart2", "usart3"], most_mps=MOST_MPS, most_dps=MOST_DPS,
+        ports=["usart1", "usart2", "usart3"],
+        most_mps=MOST_MPS if scenario.has_robot else 0.0, most_dps=MOST_DPS if scenario.has_robot else 0.0,
     )  # fmt: skip
 
 

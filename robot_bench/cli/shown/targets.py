@@ -105,24 +105,7 @@ def scenario_target(named: str) -> ViewTarget | None:
 
     if named not in known_scenarios() and not named.endswith(".toml"):
         return None
-    from robot_bench.cli.shown.live_run import LiveRun
-    from robot_bench.recording.run_folder import make_next_folder
-    from robot_bench.recording.run_record import read_run
-    from robot_bench.report.run_page import run_report
-    from robot_bench.run import run_scenario
+    from robot_bench.cli.shown.live_target import live_target
 
     scenario = load_scenario(named, trust=False)
-    if scenario.robots:
-        return _fleet_target(scenario)
-    live = LiveRun(scenario)
-    live.stays = True
-
-    def run() -> None:
-        done = run_scenario(scenario, make_next_folder(scenario.name), drive=live.drive)
-        if done.was_interrupted:
-            raise KeyboardInterrupt
-        found = kept(done.folder) or run_report(read_run(done.folder))
-        live.source.report(found.header)
-        live.stay()
-
-    return ViewTarget(source=live.source, run=run)
+    return _fleet_target(scenario) if scenario.robots else live_target(scenario)

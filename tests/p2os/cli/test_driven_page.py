@@ -11,7 +11,8 @@ from collections.abc import Callable
 import pytest
 
 from p2os.cli.main import run as p2os
-from p2os.cli.robots.driven_page import MOST_COMMANDS, TURN_NS, PageDriver
+from p2os.cli.robots.command_queue import MOST_COMMANDS
+from p2os.cli.robots.driven_page import TURN_NS, PageDriver
 from p2os.client import Link
 from p2os.client.notices import DeadmanStopped, LinkLostError, Notice
 from p2os.view.run_control import DRIVE_HOLD_NS, RunCommand

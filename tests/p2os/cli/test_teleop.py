@@ -11,8 +11,10 @@ from collections.abc import Callable
 
 import pytest
 
+from p2os.cli.robots.page_stop import PageStop
 from p2os.cli.robots.teleop import FIRST_HOLD_NS, KEYS, NEXT_HOLD_NS, QUIT_KEYS, STOP_KEYS, KeyLoop, Teleop, split_keys
 from p2os.client import DeadmanStopped, GapStopped, Link, LinkLost, Notice
+from p2os.view.run_control import RunCommand
 from simbase.timing import NS_PER_MS
 from tests.p2os.cli.driven import until
 from tests.tools.each_row import each_row
@@ -132,6 +134,42 @@ def test_a_key_is_not_held_over_a_pause_nor_are_those_that_waited(
     loop._read = lambda _ns: now.__setitem__(0, now[0] + 401 * NS_PER_MS) or pressed.pop(0)  # type: ignore[func-returns-value]
     loop.turn()
     assert loop.keys.is_over
+
+
+def test_stop_on_the_page_stands_until_what_is_held_was_let_go() -> None:
+    client, stop, now, keys = Client(), PageStop(), [0], ["w"]
+    loop = KeyLoop(teleop(), client, read=lambda _ns: [*keys], clock=lambda: now[0], stop=stop)
+
+    def turn(ms: int) -> tuple[float, float]:
+        now[0] += ms * NS_PER_MS
+        loop.turn()
+        return client.speeds[-1]
+
+    assert turn(50) == (0.3, 0.0)
+    assert stop.offer(RunCommand(do="stop"))
+    assert turn(50) == (0.0, 0.0)
+    assert "press anew" in stop.state.why
+    for _ in range(20):  # the key is held: a keyboard repeats it
+        assert turn(50) == (0.0, 0.0)
+    keys.clear()
+    assert turn(FIRST_HOLD_NS // NS_PER_MS - 1) == (0.0, 0.0)
+    assert loop.keys.is_stopped
+    assert turn(1) == (0.0, 0.0)
+    assert not loop.keys.is_stopped
+    keys.append("w")
+    assert turn(50) == (0.3, 0.0)
+    assert stop.state.why == "the terminal drives"
+
+
+def test_the_page_of_a_terminal_stops_and_does_nothing_else() -> None:
+    stop = PageStop()
+    assert not stop.take()
+    for command in (RunCommand(do="drive", forward_mps=0.1), RunCommand(do="drive"), RunCommand(do="pause")):
+        assert stop.offer(command)
+        assert "stops it, and nothing else" in stop.state.trouble
+    assert not stop.take()
+    assert stop.offer(RunCommand(do="stop"))
+    assert (stop.take(), stop.take(), stop.state.trouble, stop.state.done) == (True, False, "", 4)
 
 
 @pytest.mark.parametrize("notice", [GapStopped(NS_PER_MS), DeadmanStopped(NS_PER_MS)])

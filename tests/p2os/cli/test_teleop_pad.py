@@ -13,10 +13,12 @@ from hypothesis import strategies as st
 from p2os.cli.main import run
 from p2os.cli.robots import pad_source, teleop
 from p2os.cli.robots.pad_source import SdlPad
+from p2os.cli.robots.page_stop import PageStop
 from p2os.cli.robots.teleop import PAD_PERIOD_NS, PadDriver
 from p2os.client import GapStopped, Notice
 from p2os.client.notices import LinkLostError
 from p2os.gamepad import PAD_MPS, PAD_RADPS, Gamepad, PadReport
+from p2os.view.run_control import RunCommand
 from simbase.errors import MissingDependencyError, UsageError
 from simbase.timing import NS_PER_MS
 
@@ -26,7 +28,9 @@ UP, NOTHING, DOWN = PadReport(up=True), PadReport(), PadReport(down=True)
 class Bench:
     """A pad that follows a script, a clock, and a robot that notes what it is told."""
 
-    def __init__(self, reports: list[PadReport | None], *, link_fails_at: int = -1) -> None:
+    def __init__(
+        self, reports: list[PadReport | None], *, link_fails_at: int = -1, stop: PageStop | None = None
+    ) -> None:
         self.reports = iter(reports)
         self.now = 0
         self.reported: list[tuple[int, float, float]] = []
@@ -40,6 +44,7 @@ class Bench:
             clock=lambda: self.now,
             wait=self.wait,
             report=self.lines.append,
+            stop=stop,
         ).run()
 
     def wait(self, span_ns: int) -> None:
@@ -116,6 +121,22 @@ def test_after_a_stop_of_the_client_up_must_be_given_anew() -> None:
     assert bench.left == 1
     assert [forward for _, forward, _ in bench.reported] == [PAD_MPS, PAD_MPS, 0]
     assert "the client stopped the robot: the robot stands; Up connects again" in bench.lines
+
+
+def test_stop_on_the_page_ends_the_session_and_up_must_be_given_anew() -> None:
+    stop = PageStop()
+    stop.offer(RunCommand(do="stop"))  # of a session before
+
+    class StoppedFromPage(Bench):
+        def set_velocity(self, forward_mps: float, turn_radps: float) -> None:
+            super().set_velocity(forward_mps, turn_radps)
+            if len(self.reported) == 2:
+                stop.offer(RunCommand(do="stop"))
+
+    bench = StoppedFromPage([NOTHING, UP, *[PadReport(forward=1023)] * 4], stop=stop)
+    assert bench.left == 1
+    assert [forward for _, forward, _ in bench.reported] == [PAD_MPS, PAD_MPS, 0]
+    assert "STOP was pressed on the page: the robot stands; Up connects again" in bench.lines
 
 
 def test_a_lost_link_ends_the_session() -> None:

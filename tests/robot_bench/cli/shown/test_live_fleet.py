@@ -6,10 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from p2os.cli.robots.command_queue import MOST_COMMANDS
 from p2os.view.header import PageHeader
 from p2os.view.run_control import RunCommand, RunState
 from robot_bench.bench import Bench
-from robot_bench.cli.shown.live_fleet import MOST_COMMANDS, LiveFleet
+from robot_bench.cli.shown.live_fleet import LiveFleet
 from robot_bench.cli.shown.looked_panels import LOOK_NS
 from robot_bench.cli.shown.targets import scenario_target
 from robot_bench.recording.run_record import read_run

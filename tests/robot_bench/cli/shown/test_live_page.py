@@ -15,13 +15,14 @@ websockets = pytest.importorskip("websockets.sync.client")
 
 from p2os.cli.captures.shown_page import shown  # noqa: E402
 from p2os.cli.main import run as p2os  # noqa: E402
+from p2os.cli.robots.command_queue import MOST_COMMANDS  # noqa: E402
 from p2os.view import targets as view_targets  # noqa: E402
 from p2os.view.header import PageHeader  # noqa: E402
 from p2os.view.live import MOST_WAITING, StillRecording  # noqa: E402
 from p2os.view.recording import ViewRecording  # noqa: E402
 from p2os.view.run_control import RunCommand  # noqa: E402
 from p2os.view.server.serving import ViewServer, serving  # noqa: E402
-from robot_bench.cli.shown.live_run import MOST_COMMANDS, LiveRun  # noqa: E402
+from robot_bench.cli.shown.live_run import LiveRun  # noqa: E402
 from robot_bench.cli.shown.targets import run_target, scenario_target  # noqa: E402
 from robot_bench.recording.run_record import read_run  # noqa: E402
 from robot_bench.report.run_page import run_report  # noqa: E402
@@ -165,12 +166,19 @@ def test_run_view_is_the_run_without_and_prints_the_link(
     assert hash_of(tmp_path / "with") == hash_of(tmp_path / "without")
 
 
-@pytest.mark.parametrize("beside", [["--gdb", "1"], ["--foxglove"], ["--seeds", "1-2"], ["--port", "tcp:127.0.0.1:9"]])
+@pytest.mark.parametrize("beside", [["--foxglove"], ["--seeds", "1-2"], ["--port", "tcp:127.0.0.1:9"]])
 def test_what_cannot_stand_beside_a_page_is_said(beside: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert p2os(["run", "motors", "--view", *beside]) == 2
     said = capsys.readouterr().err
     assert said.startswith("p2os: --view cannot stand beside ")
     assert "hint: " in said
+
+
+def test_gdb_is_for_a_scenario_that_runs(alone: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert p2os(["view", str(alone), "--no-browser", "--gdb"]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("p2os: --gdb is for a scenario that runs, and ")
+    assert "hint: p2os view dodge --gdb" in said
 
 
 def test_a_browser_is_opened_unless_told_otherwise(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -187,7 +195,7 @@ def test_a_scenario_that_is_shown_ends_with_its_report_and_ctrl_c_ends_it(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     done = SimpleNamespace(folder=alone, was_interrupted=False)
-    monkeypatch.setattr("robot_bench.run.run_scenario", lambda *_args, **_more: done)
+    monkeypatch.setattr("robot_bench.cli.shown.live_target.run_scenario", lambda *_args, **_more: done)
     target = scenario_target("motors")
     assert target is not None
     assert target.run is not None
