@@ -37,9 +37,17 @@ export function Head({ header, app, layout, onLayout, onLink }: Props) {
         <span class="said" role="status">{said}</span>
         {isHelp && <Help app={app} onClose={() => setHelp(false)} />}
       </div>}
-      {header.why && <p class="why">{header.why}</p>}
+      {header.why && <p class="why">{app ? withMoments(app, header.why) : header.why}</p>}
       {trouble && <p class="trouble" role="alert">{trouble}</p>}
       {header.left_out.length > 0 && <details class="left-out-list"><summary>{`This page shows a part of what was recorded (${header.left_out.length})`}</summary><ul>{header.left_out.map((line) => <li>{line}</li>)}</ul></details>}
     </header>
   );
+}
+
+/** A text with each moment in it ("at 0.500 s") as a button that goes there. */
+function withMoments(app: App, text: string) {
+  return text.split(/(\bat \d+\.\d{3} s\b)/).map((part, n) => {
+    const ns = Math.round(Number(part.split(" ")[1]) * 1e9);
+    return n % 2 && ns <= app.clock.end.value ? <button type="button" class="link" onClick={() => app.clock.lookAt(ns, app.clock.span.value / 20)}>{part}</button> : part;
+  });
 }
