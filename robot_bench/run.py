@@ -14,7 +14,7 @@ a report can be made of the folder.
 import base64
 import contextlib
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar, cast
@@ -463,10 +463,11 @@ def run_together(
     force: bool = False,
     is_kept: Callable[[bool], bool] = lambda _passed: True,
     files: Files = Files.REPORT,
+    drive: Callable[[Mapping[str, Bench]], None] | None = None,
 ) -> RunResult:
     """Run a scenario with several robots: a run folder for each inside of `folder`, and there what came of all.
 
-    Arguments and errors as of `run_scenario`.
+    Arguments and errors as of `run_scenario`; `drive` runs all benches in place of the first one's `run_until`.
     """
     pacer = None if speed is None else RealTimePacer(speed=speed)
     with contextlib.ExitStack() as stack:
@@ -480,7 +481,7 @@ def run_together(
         for name, bench in benches.items():
             meta = meta_of(bench.scenario, bench.parts.world, run_of(bench).note, is_at_port=False)
             traces[name].meta(meta | {"robots": list(benches)})
-        driven = _drive(first, pacer, None)
+        driven = _drive(first, pacer, None if drive is None else lambda _first: drive(benches))
         passed = [_conclude(bench, traces[name], folder / name, pacer, driven) for name, bench in benches.items()]
         if is_kept(all(passed)):
             made = make_artefacts_of_all(folder, list(benches), scenario.name, files)

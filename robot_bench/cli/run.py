@@ -23,6 +23,7 @@ from robot_bench.bench.recorded_variables import variables_of
 from robot_bench.cli.debugging.gdb import gdb_port
 from robot_bench.cli.names import scenario_names, setting_keys, variable_names
 from robot_bench.cli.progress import RunDisplay
+from robot_bench.cli.shown.live_fleet import LiveFleet
 from robot_bench.cli.shown.live_run import LiveRun
 from robot_bench.cli.sweep import (
     KEPT,
@@ -39,7 +40,7 @@ from robot_bench.cli.workers import Jobs, core_count
 from robot_bench.networks import network_of
 from robot_bench.recording.run_folder import make_next_folder
 from robot_bench.remote import CAUTIOUS_ROTATION_DEG_S, CAUTIOUS_VELOCITY_MM_S
-from robot_bench.run import RunBench, RunProgress, RunResult, run_at_port, run_scenario
+from robot_bench.run import RunBench, RunProgress, RunResult, run_at_port, run_scenario, run_together
 from robot_bench.scenario import sweep
 from robot_bench.scenario.included_files import read_setting
 from robot_bench.scenario.loading import load_scenario
@@ -265,7 +266,7 @@ def run(
         raise UsageError("--foxglove-origin goes with --foxglove only", hint="add --foxglove")
     refuse_beside("foxglove", foxglove, port=port, gdb=gdb, ros=ros, inputs=inputs, robots=wanted.robots or None)
     page = view or None
-    refuse_beside("view", page, port=port, ros=ros, inputs=inputs, foxglove=foxglove, robots=wanted.robots or None)
+    refuse_beside("view", page, port=port, ros=ros, inputs=inputs, foxglove=foxglove)
     if is_sweep(wanted, seeds=seeds, seed=seed, port=port):
         alone = {
             "port": port,
@@ -297,7 +298,9 @@ def run(
     # Who looks on from outside lives in real time.
     pace = None if page else realtime or (None if ros is None and foxglove is None else 1.0)
     with RunDisplay() as display:
-        if gdb is None or view:
+        if wanted.robots and view and measured is None and gdb is None:
+            result = run_viewed_fleet(wanted, folder, realtime or 1.0, display, force=force, is_opened=not no_browser)
+        elif gdb is None or view:
             with (
                 viewed(wanted, realtime or 1.0, display, names, is_opened=not no_browser, gdb=gdb) if view
                 else driven(wanted, ros=ros, inputs=inputs, foxglove=foxglove, origins=foxglove_origin or ())
@@ -388,6 +391,19 @@ def viewed(
         live = LiveRun(scenario, speed=speed, variables=variables, on_wait=display.raise_if_interrupted, gdb=port)
         with shown(live.source, is_opened=is_opened):
             yield live.drive
+
+
+def run_viewed_fleet(
+    scenario: Scenario, folder: Path, speed: float, display: RunDisplay, *, force: bool, is_opened: bool
+) -> RunResult:
+    """Run robots that share a world while a page shows them.
+
+    Raises:
+        UsageError, MissingDependencyError: As of `shown`.
+    """
+    live = LiveFleet(scenario, speed=speed, on_wait=display.raise_if_interrupted)
+    with shown(live.source, is_opened=is_opened):
+        return run_together(scenario, folder, on_progress=display.update, force=force, drive=live.drive)
 
 
 def is_sweep(scenario: Scenario, *, seeds: str | None, seed: int | None, port: str | None) -> bool:

@@ -7,7 +7,7 @@ Invariant: the events alone decide what is shown; who shows them decides nothing
 """
 
 import math
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from copy import copy
 from dataclasses import replace
 from itertools import groupby
@@ -22,7 +22,7 @@ from p2os.view.header import ChannelHeader, RobotHeader, SensorPlace, StateTrans
 from p2os.view.packet_rows import PacketRow, PacketRows
 from p2os.view.recording import ChannelTrack, ViewRecording
 from p2os.view.world_plan import thing_of, world_of
-from robot_bench.events.codec import Json
+from robot_bench.events.codec import Blocks, EdgeBlock, Json, Levels, Recorded
 from robot_bench.events.kinds import (
     CanTransfer,
     Clearance,
@@ -332,6 +332,25 @@ class RunTracks:
         self._track("things", "things", group="world").append(
             t, place, is_there, thing.x_m, thing.y_m, thing.heading_rad
         )
+
+
+def add_events(tracks: RunTracks, blocks: Blocks, events: Iterable[Recorded]) -> None:
+    """Add what a trace is written of as it comes, edges too.
+
+    Args:
+        tracks: Of one robot, or of one future of it.
+        blocks: Its wires, as far as the trace has come.
+        events: What was handed on at once.
+    """
+    for event in events:
+        if isinstance(event, Levels):
+            blocks.begin(event)
+            begun = zip(event.nets, event.levels, strict=True)
+            tracks.edges({net: Edges([(event.t, int(level))]) for net, level in begun})
+        elif isinstance(event, EdgeBlock):
+            tracks.edges(dict(blocks.take(event)))
+        else:
+            tracks.take(event)
 
 
 _ROWS: Mapping[type, Callable[[RunTracks, Any], None]] = {

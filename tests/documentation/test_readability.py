@@ -8,7 +8,6 @@ from tests.documentation.readability import CELL, LONGEST, MAP_WORDS, MEAN, ROOT
 CEILINGS = {
     "docs/adapter-firmware.md": (17.5, 50, 9, 5),
     "docs/board-simulation.md": (7.1, 24, 0, 1),
-    "docs/view.md": (21.1, 58, 3, 0),
 }  # fmt: skip
 PAGES = read_pages()
 BOUNDS = (MEAN, LONGEST, 0, 0)

@@ -74,7 +74,7 @@ def render(whole: Whole) -> str:
     return document(
         PageHeader(
             title=campaign.name, verdict=verdict, standing="failed" if failures else "passed", lead=lead,
-            sections=list(_sections(whole)),
+            why=_why(whole), sections=list(_sections(whole)),
             footer=f"p2os campaign --resume {shlex.quote(str(whole.folder))} goes on where it was interrupted",
         )
     )  # fmt: skip
@@ -83,12 +83,12 @@ def render(whole: Whole) -> str:
 def _sections(whole: Whole) -> Iterator[PageSection]:
     rows, failures = whole.progress.rows, whole.failures
     yield PageSection(title="What came of it", blocks=[PageTable(rows=named_rows(list(_figures(whole))))])
-    yield PageSection(title="What it cost", blocks=[PageTable(rows=named_rows(list(_cost(whole))))])
     blocks: list[PageBlock] = [block for row in failures[:MOST_SHOWN] for block in _failure(row, whole)]
     if len(failures) > MOST_SHOWN:
         blocks.append(PageText(text=f"and {len(failures) - MOST_SHOWN} more in failures/"))
     note = "each run again in another process with the same hash"
     yield PageSection(title="Failures", note=note, blocks=blocks or [PageText(text="none")])
+    yield PageSection(title="What it cost", blocks=[PageTable(rows=named_rows(list(_cost(whole))))])
     space: list[PageBlock] = [_over(name, rows) for name in _dimensions(rows)]
     note = "a point a run; below 0 it failed"
     yield PageSection(title="Margins over what varied", note=note, blocks=space or [PageText(text="nothing varied")])
@@ -96,6 +96,15 @@ def _sections(whole: Whole) -> Iterator[PageSection]:
     note = "by the cheap runs, and what no point has"
     yield PageSection(title="Reached", note=note, blocks=[PageTable(rows=named_rows(list(_reached(whole))))])
     yield PageSection(title="Where the cheap runs ended", note="a point a run, by its margin", blocks=[_map(whole)])
+
+
+def _why(whole: Whole) -> str:
+    """Return what the first failure is, and how it is looked at; empty where there is none."""
+    row = next(iter(whole.failures), None)
+    if row is None or row.failing is None:
+        return ""
+    why = next(iter(row.failing.outcome.failures), row.finding.value)
+    return f"point {row.number}: {why}; to look at it, run the command below its plan, and p2os view what it makes"
 
 
 def _figures(whole: Whole) -> Iterator[tuple[str, str]]:

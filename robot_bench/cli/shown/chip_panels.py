@@ -94,7 +94,7 @@ def board_panel(subject: object) -> ViewPanel | None:
 class _RunningProgram:
     """What has run of a board's program so far: counted anew where anything new has run since.
 
-    The board knows which blocks it has entered at no cost to the run. Counting takes some 20 ms of a program of 16 KB;
+    The board knows which blocks it has entered at no cost to the run. Counting takes some 20 ms of a program of 3 KB;
     of larger ones it is done at each second, third, … look only.
     """
 

@@ -27,28 +27,26 @@ from p2os.view.header import PageHeader, PanelHeader, PanelState
 from p2os.view.live import LiveRecording
 from p2os.view.recording import ViewRecording
 from p2os.view.run_control import MOST_DPS, MOST_MPS, RunCommand, RunState
-from p2os.view.targets import ViewPanel, panels_of
+from p2os.view.targets import panels_of
 from robot_bench.bench import Bench, run_of
 from robot_bench.cli.debugging.future import Future, SeenStretch
 from robot_bench.cli.debugging.gdb_beside import GdbBeside
 from robot_bench.cli.debugging.session import MAIN, RunSession
+from robot_bench.cli.shown.looked_panels import LookedPanels
 from robot_bench.cli.shown.offered_hands import hands_of
 from robot_bench.cli.shown.saved_hands import pytest_text, scenario_text
-from robot_bench.events.codec import Blocks, EdgeBlock, Json, Levels, Recorded
+from robot_bench.events.codec import Blocks, Json, Recorded
 from robot_bench.recording.run_folder import HANDS_NAME
 from robot_bench.report.run_page import lead_of
 from robot_bench.run import meta_of
 from robot_bench.scenario.hands.timed import Hand
 from robot_bench.scenario.scenario import Scenario
-from robot_bench.view.run_tracks import RunTracks
+from robot_bench.view.run_tracks import RunTracks, add_events
 from robot_bench.view.variable_track import VariableTrack
-from robot_bench.wires.edges import Edges
 from simbase.errors import UsageError
 from simbase.files import write_text
 from simbase.timing import Nanos
 
-#: chosen: panels that are looked at ten times a second, of all pages together.
-MOST_LOOKS, LOOK_NS = 12, 100_000_000
 #: chosen: how long a command of a page waits at most while GDB is listened for, seconds.
 GDB_WAIT_S = 0.02
 #: chosen: how long a signal may wait to be looked at where a run stands still, seconds.
@@ -140,13 +138,9 @@ class LiveRun:
         self._blocks: dict[str, Blocks] = {}
         self._speed, self._on_wait, self._clock = speed, on_wait, clock
         self._variables = variables
-        self._panels: dict[str, ViewPanel] = {}
+        self._panels = LookedPanels(())
         #: Whose chip the panels show.
         self._shown_bench: Bench | None = None
-        #: What pages look at, by panel and choice, and what each showed last.
-        self._looked: dict[tuple[str, str], PanelState | None] = {}
-        self._wanted: set[tuple[str, str]] = set()
-        self._looked_at: Nanos = 0
         self._commands = CommandQueue()
         #: How the run stands; None before it has begun.
         self._state = RunState(is_running=True, speed=speed)
@@ -187,11 +181,7 @@ class LiveRun:
 
     def look(self, panel: str, choice: str) -> PanelState | None:
         """Return what a panel showed last; while it is asked for, it is looked at ten times a second."""
-        key = panel, choice
-        if panel not in self._panels or len(self._wanted) >= MOST_LOOKS:
-            return None
-        self._wanted.add(key)
-        return self._looked.get(key)
+        return self._panels.asked(panel, choice)
 
     # As what runs the bench.
 
@@ -207,7 +197,8 @@ class LiveRun:
         session = self._session = RunSession(bench, self, Path(self._folder.name), self._speed, waits)
         self._gdb = None if self._gdb_port is None else GdbBeside(session, self._gdb_port)
         session.watch(self._variables)
-        self._panels, self._shown_bench = {one.name: one for one in panels}, bench
+        self._panels.replace(panels)
+        self._shown_bench = bench
         try:
             while not session.is_over or session.is_running:
                 self._turn(session)
@@ -269,19 +260,13 @@ class LiveRun:
 
     def _look_at_panels(self, session: RunSession) -> None:
         """Look at the panels that somebody looks at: at most ten times a second of the clock."""
-        clock_ns, at_ns = self._clock(), session.chosen.now_ns
-        if not self._wanted or clock_ns - self._looked_at < LOOK_NS:
+        clock_ns = self._clock()
+        if not self._panels.is_due(clock_ns):
             return
         if session.chosen.bench is not self._shown_bench:
             self._shown_bench = session.chosen.bench
-            self._panels = {one.name: one for one in panels_of(self._shown_bench.chip)}
-            self._looked.clear()
-        wanted, self._wanted, self._looked_at = self._wanted, set(), clock_ns
-        for panel, choice in wanted:
-            sections = self._panels[panel].look(choice)
-            found = PanelState(name=panel, choice=choice, at_ns=at_ns, sections=sections)
-            if found != self._looked.get((panel, choice)):
-                self._looked[panel, choice] = found
+            self._panels.replace(panels_of(self._shown_bench.chip))
+        self._panels.look(clock_ns, session.chosen.now_ns)
 
     def _hand_over_variables(self, session: RunSession) -> None:
         for future, types in session.watched():
@@ -382,13 +367,4 @@ class LiveRun:
                 self._seen[key].take(stretch.begins_ns, stretch.until_ns, rows)
 
     def _add_events(self, happened: BenchReleased) -> None:
-        tracks, blocks = self._tracks[happened.future], self._blocks[happened.future]
-        for event in happened.events:
-            if isinstance(event, Levels):
-                blocks.begin(event)
-                begun = zip(event.nets, event.levels, strict=True)
-                tracks.edges({net: Edges([(event.t, int(level))]) for net, level in begun})
-            elif isinstance(event, EdgeBlock):
-                tracks.edges(dict(blocks.take(event)))
-            else:
-                tracks.take(event)
+        add_events(self._tracks[happened.future], self._blocks[happened.future], happened.events)

@@ -13,6 +13,7 @@ from robot_bench.recording.run_record import read_run
 from robot_bench.report.run_page import run_report
 from robot_bench.run import run_scenario
 from robot_bench.scenario.scenario import Scenario
+from robot_bench.view.kept_recording import kept
 
 
 def live_target(scenario: Scenario) -> ViewTarget:
@@ -35,7 +36,8 @@ def _live_target(scenario: Scenario, gdb: GdbPort | None = None) -> ViewTarget:
             done = run_scenario(scenario, make_next_folder(scenario.name), drive=live.drive)
             if done.was_interrupted:
                 raise KeyboardInterrupt
-            live.source.report(run_report(read_run(done.folder)).header)
+            found = kept(done.folder) or run_report(read_run(done.folder))
+            live.source.report(found.header)
             live.stay()
 
     return ViewTarget(source=live.source, run=run)

@@ -7,11 +7,15 @@ import contextlib
 import gc
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from p2os.view.live import StillRecording
 from p2os.view.targets import ViewTarget
 from robot_bench.recording.run_record import TRACE_NAME
 from robot_bench.view.kept_recording import is_long, keep, kept
+
+if TYPE_CHECKING:
+    from robot_bench.scenario.scenario import Scenario
 
 
 def run_target(named: str) -> ViewTarget | None:
@@ -59,6 +63,24 @@ def _target_of_all(folder: Path) -> ViewTarget | None:
     return ViewTarget(source=StillRecording(report_of_all(outcome, records)))
 
 
+def _fleet_target(scenario: "Scenario") -> ViewTarget:
+    """Return a scenario with several robots, run at the pace of the clock; then its run folder."""
+    from robot_bench.cli.shown.live_fleet import LiveFleet
+    from robot_bench.recording.run_folder import make_next_folder
+    from robot_bench.run import run_together
+
+    live = LiveFleet(scenario)
+
+    def run() -> None:
+        done = run_together(scenario, make_next_folder(scenario.name), drive=live.drive)
+        if done.was_interrupted:
+            raise KeyboardInterrupt
+        if (found := _target_of_all(done.folder)) is not None:
+            live.source.end(found.source.recording.header)
+
+    return ViewTarget(source=live.source, run=run)
+
+
 @contextlib.contextmanager
 def _without_collecting() -> Iterator[None]:
     """Search for no garbage in a block that makes a million objects and drops none."""
@@ -85,4 +107,5 @@ def scenario_target(named: str) -> ViewTarget | None:
         return None
     from robot_bench.cli.shown.live_target import live_target
 
-    return live_target(load_scenario(named, trust=False))
+    scenario = load_scenario(named, trust=False)
+    return _fleet_target(scenario) if scenario.robots else live_target(scenario)

@@ -349,7 +349,7 @@ def test_the_data_set_has_a_row_a_run_and_the_page_names_every_failure(tmp_path:
     assert {plan["title"] for plan in plans} == {f"point {number}" for number in failed}
     assert all(plan["world"]["things"] and plan["ways"][0]["x"] for plan in plans)
     titles = [section["title"] for section in page.header["sections"]]
-    assert titles[:3] == ["What came of it", "What it cost", "Failures"]
+    assert titles[:3] == ["What came of it", "Failures", "What it cost"]
     (over, *_) = page.section("Margins over what varied")["blocks"]
     assert sum(len(curve["x"]) for curve in over["curves"]) == len(whole.progress.rows)
 

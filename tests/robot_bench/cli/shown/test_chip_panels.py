@@ -20,7 +20,8 @@ from p2os.view.run_control import RunCommand
 from p2os.view.targets import panels_of
 from robot_bench.bench import Bench
 from robot_bench.cli.shown.chip_panels import LEFT, RIGHT
-from robot_bench.cli.shown.live_run import LOOK_NS, LiveRun
+from robot_bench.cli.shown.live_run import LiveRun
+from robot_bench.cli.shown.looked_panels import LOOK_NS
 from robot_bench.recording.run_record import read_run
 from robot_bench.report.make import Files
 from robot_bench.run import run_scenario

@@ -29,6 +29,8 @@ export type Look = readonly [string, string];
 
 export type Command = Pick<RunCommand, "do"> & Partial<RunCommand>;
 
+/** Kinds that are shown of all robots, whichever is chosen: where they are. */
+const OF_ALL: ReadonlySet<string> = new Set(["pose", "ranges", "things"]);
 /** How long requests of one moment are gathered, ms. */
 const GATHERED_MS = 40;
 /** Pixels that a whole run is asked for. */
@@ -46,6 +48,8 @@ export class Store {
   /** How the run stands, where it can be controlled, and whether this page may. */
   readonly run: Signal<RunState | null> = signal(null);
   readonly mayControl = signal(false);
+  /** Of several robots the one whose pins, packets, plots and consoles are shown; empty: all of them. */
+  readonly robot = signal("");
   /** Counts up when rows came. */
   readonly version = signal(0);
   /** Names of variables, for what was typed last. */
@@ -94,8 +98,21 @@ export class Store {
     this.panels.value = new Map(this.panels.peek()).set(`${panel.name} ${panel.choice}`, panel);
   }
 
+  /** Channels of the robot that is chosen, and what belongs to all of them. */
+  get chosen(): readonly ChannelHeader[] {
+    const robot = this.robot.value, all = this.header.value.channels;
+    return robot ? all.filter(({ source }) => !source || source === robot) : all;
+  }
+
+  /** Those of a kind; where robots are is shown of all, whichever is chosen. */
   channels(kind: string): readonly ChannelHeader[] {
-    return this.header.value.channels.filter((channel) => channel.kind === kind);
+    return (OF_ALL.has(kind) ? this.header.value.channels : this.chosen).filter((channel) => channel.kind === kind);
+  }
+
+  /** Names of robots of which one may be chosen: none where they are futures of one. */
+  get robots(): readonly string[] {
+    const names = this.shown.value ? [] : this.header.value.robots.map(({ name }) => name).filter(Boolean);
+    return names.length > 1 ? names : [];
   }
 
   channel(id: number): ChannelHeader | undefined {

@@ -1,5 +1,5 @@
 // The bar of a run that this page controls: on, still, a step, back; its speed; where it halts; its futures.
-import { useRef, useState } from "preact/hooks";
+import { useEffect, useRef, useState } from "preact/hooks";
 import { RATES } from "../time/clock";
 import { moment } from "../time/format";
 import { type App, UNITS } from "../shell/app";
@@ -19,14 +19,17 @@ export function RunBar({ app }: { app: App }) {
     bar.current?.querySelector<HTMLElement>("[aria-expanded=true]")?.focus();
     setOpen("");
   };
+  // Robots that share a world go on, and have no futures.
+  const canGoBack = run.futures.length > 0;
+  useEffect(() => { if (!canGoBack) app.unit.value = "millisecond"; }, [canGoBack]);
   const said = run.trouble || (run.is_running ? "" : [isHere ? run.why : `the run stands at ${moment(run.head_ns)}`, isHere ? run.place : ""].filter(Boolean).join(" · "));
   return (
     <section class="timeline run-bar" aria-label="Time" ref={bar} onKeyDown={(event) => { if (event.key === "Escape" && open) close(); }}>
-      <IconButton icon="stepBack" label={`Back by one ${unitName(app)}`} disabled={run.is_running} onClick={() => app.step(-1)} />
+      {canGoBack && <IconButton icon="stepBack" label={`Back by one ${unitName(app)}`} disabled={run.is_running} onClick={() => app.step(-1)} />}
       <IconButton icon={run.is_running ? "pause" : "play"} label={run.is_running ? "Pause the run" : "Let the run go on from here"} onClick={() => app.toggle()} />
       <IconButton icon="stepOn" label={`On by one ${unitName(app)}`} disabled={run.is_running} onClick={() => app.step(1)} />
       <select class="unit" aria-label="A step goes by one" value={app.unit.value} onChange={(event) => { app.unit.value = event.currentTarget.value as typeof app.unit.value; }}>
-        {UNITS.map(([unit, name]) => <option value={unit}>{name}</option>)}
+        {UNITS.filter(([unit]) => canGoBack || unit === "millisecond").map(([unit, name]) => <option value={unit}>{name}</option>)}
       </select>
       <select class="rate" aria-label="Speed of the run" value={run.speed} onChange={(event) => app.ask({ do: "speed", speed: Number(event.currentTarget.value) })}>
         {[...new Set([...RATES, run.speed])].filter(Boolean).sort((a, b) => a - b).map((rate) => <option value={rate}>{`${rate} ×`}</option>)}
@@ -35,10 +38,10 @@ export function RunBar({ app }: { app: App }) {
       <Scrub app={app} />
       <output class="now" aria-live="off">{moment(clock.now.value, run.is_running ? clock.span.value / 1000 : FINE_NS)}</output>
       <IconButton icon="last" label="To where the run stands" pressed={isHere} onClick={() => clock.goWithRun()} />
-      <span class="bar-buttons">
+      {canGoBack && <span class="bar-buttons">
         <BarButton icon="halts" name="Halts" count={run.halts.length} isOpen={open === "halts"} onClick={() => toggle("halts")} />
         <BarButton icon="futures" name="Futures" count={run.futures.length} isOpen={open === "futures"} onClick={() => toggle("futures")} />
-      </span>
+      </span>}
       <p class={run.trouble ? "run-why trouble" : "run-why"} role={run.trouble ? "alert" : "status"}>{said}</p>
       {open === "halts" && <Halts app={app} onClose={close} />}
       {open === "futures" && <Futures app={app} onClose={close} />}

@@ -97,7 +97,7 @@ export class App {
     if (!run || this.store.all.value.hands?.is_real) return; // a robot that is there stands nowhere in time
     batch(() => {
       const looked = run.futures.filter(({ name }) => name === run.future || name === beside);
-      const sources = looked.map(({ source }) => source), end_ns = Math.max(start_ns, ...looked.map((one) => one.end_ns));
+      const sources = looked.map(({ source }) => source), end_ns = looked.length ? Math.max(start_ns, ...looked.map((one) => one.end_ns)) : this.store.all.value.end_ns;
       const was = this.store.shown.peek();
       if (looked.length && (was?.end_ns !== end_ns || was.sources.join("\n") !== sources.join("\n"))) this.store.shown.value = { sources, end_ns };
       this.clock.head.value = run.head_ns;

@@ -51,8 +51,12 @@ export function trimmed(value: number, digits: number): string {
   return text.includes("e") ? text : text.includes(".") ? text.replace(/\.?0+$/, "") : text;
 }
 
+/** What is less than this is 0 that was computed: no channel measures so finely. */
+const LEAST = 1e-9;
+
 /** A value of a channel with its unit. */
-export function quantity(value: number, unit: string): string {
+export function quantity(measured: number, unit: string): string {
+  const value = Math.abs(measured) < LEAST ? 0 : measured;
   return unit ? `${trimmed(value, 5)} ${unit}` : trimmed(value, 5);
 }
 

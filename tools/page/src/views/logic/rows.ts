@@ -19,7 +19,7 @@ const HEIGHTS: Readonly<Record<RowKind, number>> = { group: 20, wire: 24, analog
 export const DECODED = new Set(["packets", "text", "state"]);
 
 export function rowsOf(store: Store): Row[] {
-  const { channels } = store.header.value, rows: Row[] = [];
+  const channels = store.chosen, rows: Row[] = [];
   let top = 0;
   const add = (kind: RowKind, title: string, channel?: ChannelHeader, waves?: ChannelHeader) => {
     rows.push({ kind, title, top, height: HEIGHTS[kind], channel, waves });

@@ -34,12 +34,12 @@ export function chartsOf(store: Store): Chart[] {
     if (!charts.has(key)) charts.set(key, { title, unit, curves: [] });
     charts.get(key)!.curves.push(curve);
   };
-  for (const channel of store.header.value.channels) {
+  for (const channel of store.chosen) {
     if (channel.kind !== "samples") continue;
     const name = [channel.source, channel.name].filter(Boolean).join(" ");
     put(channel.group || channel.name, channel.unit, { key: `${channel.id}`, name, channel, column: "value", factor: 1, isStepped: channel.is_stepped, mark: channel.mark });
   }
-  for (const [title, unit, parts] of POSE) for (const channel of store.channels("pose")) for (const [name, column, factor] of parts)
+  for (const [title, unit, parts] of POSE) for (const channel of store.chosen.filter(({ kind }) => kind === "pose")) for (const [name, column, factor] of parts)
     put(title, unit, { key: `${channel.id} ${column}`, name: [channel.source, name].filter(Boolean).join(" "), channel, column, factor, isStepped: false, mark: null });
   const watched = (chart: Chart) => Number(chart.unit !== "" || !chart.curves.every((curve) => curve.channel.kind === "samples"));
   return [...charts.values()].sort((a, b) => watched(a) - watched(b)).flatMap(apart);
