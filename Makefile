@@ -16,7 +16,7 @@ JOBS   ?= 3
 COMPILED := $(wildcard bluepill_sim/extension/source/*/*) robot_bench/wires/edges.c \
     $(shell find adapter_fw/core adapter_fw/capi adapter_fw/esp32/main adapter_fw/esp32_sim -type f)
 
-.PHONY: page page-check setup demo test lint type unit wheels bench bench-history soak steady mutants hostile foreign clean firmware mutation-tools board board-check board-tools pictures docs generated
+.PHONY: page page-check setup demo test lint type unit wheels bench bench-history soak steady mutants hostile foreign clean firmware mutation-tools board board-check board-tools pictures site generated
 
 setup: $(STAMP)
 
@@ -163,9 +163,11 @@ page-check:
 	@if command -v npm >/dev/null; then cd tools/page && npm ci --silent --no-audit --ignore-scripts && npm run --silent check; \
 	    else echo "make: no Node: the page is not built and compared"; fi
 
-# The pages of the API, from the docstrings, in build/api.
-docs: setup
-	$(BIN)/python tools/make_api_pages.py
+# The site (docs/, and pages that are generated) in build/site, strictly: what leads nowhere is an error. Nothing is fetched but Zensical, once.
+site: setup
+	@$(BIN)/python -c 'import zensical' 2>/dev/null || \
+	    $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile -c constraints.txt -e '.[site]'
+	$(BIN)/python -m tools.website
 
 clean:
 	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .coverage .coverage.* runs

@@ -164,7 +164,7 @@ TARGETS = {
     "esp32-rev_b": _on_simulated_esp32("rev_b", "none"),
     "esp32-rev_b-pad": _on_simulated_esp32("rev_b", "bluepad32"),
     "esp32-rev_c": _on_simulated_esp32("rev_c", "none"),
-    "units": _on_host("units", SELFTEST / "units.cpp", SELFTEST / "robot.cpp"),
+    "units": _on_host("units", *sorted((SELFTEST / "units").glob("*.cpp")), SELFTEST / "robot.cpp"),
     "library": _on_host(
         "library", SELFTEST / "library.cpp", SELFTEST / "robot.cpp", HERE / "library" / "src" / "P2OSClient.cpp",
         include=(HERE / "core", HERE / "library" / "src", HERE / "stubs" / "arduino"),

@@ -194,10 +194,10 @@ class Adapter(Stateful):
         self._baud_place = 0
         self._now = now
         #: The earliest deadline, and the earliest that is no sample.
-        self._deadline: Nanos = now
-        self._other: Nanos = now
+        self._deadline: Nanos
+        self._other: Nanos
         #: When bytes that the receiver holds are seen.
-        self._bytes_at: Nanos = NEVER
+        self._bytes_at: Nanos
         self._clear()
         self._state = AdapterState.BOOTING
         self._reason = "power"
@@ -455,7 +455,7 @@ class Adapter(Stateful):
         self._stop_repeater.reset()
         self.samples.next = self._now
         self._masters.reset()
-        self._driver.reset(self._now)
+        self._driver.stop()
         self.distances.forget()
         self._codes.reset()
         self.session.forget()
@@ -463,7 +463,6 @@ class Adapter(Stateful):
 
     def _follow_reset(self, now: Nanos) -> None:
         """Follow the reset wire, whose level does not fit the state."""
-        self._now = now
         if self._state is AdapterState.RESET:
             self._agenda.boot_at = now + self.settings.boot_ns
             if self._receiver is not None:
@@ -493,8 +492,7 @@ class Adapter(Stateful):
             if isinstance(event, StandardSip):
                 self._take_sip(event, now)
             elif isinstance(event, SessionOpened):
-                if self._state is AdapterState.CONNECTING:
-                    self._open(now, event.robot)
+                self._open(now, event.robot)
             elif self._state is AdapterState.CONNECTING:
                 self.session.drop(now)
                 self._agenda.retry_at = now + self.settings.retry_ns
@@ -502,7 +500,7 @@ class Adapter(Stateful):
                 self._notify(
                     now, "no connection", f"{event.reason}; tries again in {self.settings.retry_ns / NS_PER_S:.1f} s"
                 )
-            elif self._state in OPEN_STATES:
+            else:
                 self._lose(now, "lost", event.reason)
 
     def _open(self, now: Nanos, robot: str) -> None:

@@ -80,12 +80,6 @@ class Driver(Stateful):
         """Take standing still as wanted."""
         self._pacer.begin(STILL)
 
-    def reset(self, now: Nanos) -> None:
-        """Forget everything."""
-        self._enables_left = 0
-        self.stop()
-        self.plausibility.begin(now)
-
     def want(self, speeds: CommandedSpeeds) -> None:
         """Take the newest speeds."""
         self._pacer.wanted = speeds

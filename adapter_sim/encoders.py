@@ -38,14 +38,12 @@ from dataclasses import dataclass
 
 from adapter_sim.codec import divide_half_away, encoder_count
 from adapter_sim.settings import AdapterSettings, EncoderAtOpen
-from p2os.protocol.odometry import Unwrapper
+from p2os.protocol.odometry import POSITION_MODULUS, Unwrapper
 from p2os.protocol.sip import StandardSip
 from p2os.robots.parameters import RobotParameters
 from simbase.state import Stateful
 from simbase.timing import Nanos
 
-#: x and y on the wire.
-POSITION_MODULUS = 1 << 15
 #: Headings on the wire: counts a turn.
 HEADING_MODULUS = 1 << 12
 #: The mean of two headings needs half a count.

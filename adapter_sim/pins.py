@@ -382,4 +382,3 @@ class Debounce(Stateful):
         """Count as low, whatever was seen."""
         self.level = False
         self._raw = False
-        self._since = 0

@@ -115,7 +115,6 @@ class Session(Stateful):
         """Forget everything, as after a reset."""
         self._connection = Connection(ConnectionRole.CLIENT, settings=self._settings)
         self._output = []
-        self._robot = ""
 
     def receive(self, data: bytes, now: Nanos) -> None:
         """Take bytes of the robot."""

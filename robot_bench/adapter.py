@@ -37,7 +37,7 @@ from simbase.timing import NS_PER_S, Nanos, Reached
 #: The firmware's core, as a module.
 PART = "robot_bench._adapter_firmware"
 #: Of adapter_capi.h.
-VERSION = 3
+VERSION = 4
 _MAX_FRAME_BYTES = 9
 #: What helps when a state cannot be taken up.
 RUN_ANEW = "run the scenario anew, and save it again"

@@ -67,7 +67,7 @@ ALLOWED = {
     "adapter_sim": {"p2os"},
     "robot_bench": {"p2os", "bluepill_sim", "adapter_sim", "typer", "rich", "click"},
     "robot_bench.drives": {"p2os", "numpy"},
-    "robot_bench.view": {"p2os", "adapter_sim"},
+    "robot_bench.view": {"p2os", "adapter_sim", "bluepill_sim"},
     "robot_bench.report": {"p2os", "matplotlib"},
     "robot_bench.report.edge_picture": {"bluepill_sim", "matplotlib"},
     "robot_bench.report.explain": {"p2os", "bluepill_sim", "adapter_sim"},

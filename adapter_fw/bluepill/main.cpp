@@ -7,6 +7,8 @@
 
 #include "../core/app/event_log.hpp"
 #include "../core/app/runner.hpp"
+#include "../generated/rev_b/pins.hpp"
+#include "../generated/robots.hpp"
 #include "hardware.hpp"
 #include "registers.hpp"
 
@@ -29,7 +31,7 @@ extern "C" int main() {
   bluepill::Wires wires;
   bluepill::Uart uart;
   static app::EventLog log;
-  adapter::Adapter part({}, {}, {}, clock.now());
+  adapter::Adapter part({}, *adapter::find_robot("p2dx"), board::WIRES, clock.now());
   part.attach(&wires, &wires, &log);
   app::Runner runner(part, clock, uart, nullptr);
   for (;;) {

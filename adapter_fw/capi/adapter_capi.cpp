@@ -35,7 +35,7 @@ constexpr Field<WireNumbers> WIRES[] = {
 
 constexpr const char* STATUS[] = {
     "motor1", "motor2", "forward_mm_s", "turn_deg_s", "left_count", "right_count", "left_shown", "right_shown",
-    "sips", "jumps", "driven", "levels", "baud", "master", "frames", "noise_bytes", "bad_checksums", "bad_counts",
+    "left_travel_nm", "right_travel_nm", "sips", "jumps", "driven", "levels", "baud", "master", "frames", "noise_bytes", "bad_checksums", "bad_counts",
     "stalled", "rescued", "frames_received", "frames_ignored", "malformed", "sync_timeouts",
     "losses", "overflows",
 };
@@ -47,7 +47,7 @@ const char* name_at(const Field<Owner> (&fields)[SIZE], std::int32_t place) {
 
 template <typename Owner, std::size_t SIZE>
 Owner read(const Field<Owner> (&fields)[SIZE], const std::int64_t* values) {
-  Owner owner;
+  Owner owner{};
   for (std::size_t place = 0; place < SIZE; ++place) {
     fields[place].set(owner, values[place]);
   }
@@ -197,7 +197,7 @@ void adapter_status(const adapter_handle* handle, int64_t* values) {
   const p2os::ClientStats& client = part.client().stats();
   const std::int64_t status[] = {
       part.motor(1), part.motor(2), part.speeds().forward_mm_s, part.speeds().turn_deg_s, part.counts().left,
-      part.counts().right, part.counts_shown().left, part.counts_shown().right, part.sips(), part.jumps(),
+      part.counts().right, part.counts_shown().left, part.counts_shown().right, part.travel_nm().left, part.travel_nm().right, part.sips(), part.jumps(),
       part.outputs().driven(), part.outputs().levels(), part.baud(), static_cast<std::int64_t>(part.master()),
       wire.frames, wire.noise_bytes, wire.bad_checksums, wire.bad_counts, wire.stalled, wire.rescued,
       client.frames_received, client.frames_ignored, client.malformed, client.sync_timeouts, client.losses,

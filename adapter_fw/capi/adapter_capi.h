@@ -14,7 +14,7 @@ extern "C" {
 #endif
 
 /* Raised when the meaning or the order of anything below changes. */
-#define ADAPTER_CAPI_VERSION 3
+#define ADAPTER_CAPI_VERSION 4
 
 typedef struct adapter_handle adapter_handle;
 

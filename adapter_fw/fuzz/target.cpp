@@ -17,6 +17,8 @@
 #include "../core/adapter/adapter.hpp"
 #include "../core/adapter/fields.hpp"
 #include "../core/app/console.hpp"
+#include "../generated/rev_b/pins.hpp"
+#include "../generated/robots.hpp"
 #include "../selftest/robot.hpp"
 
 namespace {
@@ -77,7 +79,7 @@ class World final : private hal::PinsIn,
   explicit World(Source& source)
       : source_(source),
         settings_(settings_of(source, wires_)),
-        part_(settings_, {}, wires_, 0),
+        part_(settings_, *adapter::find_robot("p2dx"), wires_, 0),
         test_({*this, *this, *this, *this, nullptr}),
         console_({part_, log_, test_, *this, *this, wires_, "fuzz", "power"}) {
     part_.attach(&test_, &test_, &log_);
@@ -236,7 +238,7 @@ class World final : private hal::PinsIn,
   bool save(const char*, std::int64_t) override { return true; }
   void forget(const char*) override {}
 
-  adapter::WireNumbers wires_;
+  const adapter::WireNumbers& wires_ = board::WIRES;
   Source& source_;
   adapter::Settings settings_;
   adapter::Adapter part_;

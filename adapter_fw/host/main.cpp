@@ -21,6 +21,7 @@
 #include "../core/app/console.hpp"
 #include "../core/app/runner.hpp"
 #include "../core/app/event_printer.hpp"
+#include "../generated/rev_b/pins.hpp"
 #include "../generated/robots.hpp"
 #include "file_store.hpp"
 #include "line.hpp"
@@ -123,7 +124,7 @@ void wait(const host::Line& line, const host::Wires& wires, int input, p2os::Nan
 //: Returns the exit code, or RESTART.
 int run(const Options& options, host::Line& line, host::Wires& wires, host::FileStore& store, host::Standard& out,
         host::Standard& err, WallClock& clock, app::RetainedWheels& retained) {
-  const adapter::WireNumbers numbers;
+  const adapter::WireNumbers& numbers = board::WIRES;
   const char* fault = nullptr;
   const adapter::Settings settings = app::stored_settings(store, numbers, fault);
   if (fault != nullptr) {

@@ -1,6 +1,8 @@
 #include "selftest.hpp"
 
 #include "../core/adapter/adapter.hpp"
+#include "../generated/rev_b/pins.hpp"
+#include "../generated/robots.hpp"
 #include "robot.hpp"
 
 namespace selftest {
@@ -38,7 +40,7 @@ class RandomSource {
 //: The adapter with everything around it.
 class Trial final : private hal::PinsIn, private hal::PinsOut, private adapter::Observer {
  public:
-  explicit Trial(std::uint32_t seed) : random_source_(seed), part_(adapter::Settings{}, {}, {}, 0) {
+  explicit Trial(std::uint32_t seed) : random_source_(seed), part_({}, *adapter::find_robot("p2dx"), board::WIRES, 0) {
     part_.attach(this, this, this);
   }
 

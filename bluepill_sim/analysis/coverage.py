@@ -11,7 +11,7 @@ Invariant: counts only grow; watching changes nothing.
 """
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 from bluepill_sim.board import BluePill
@@ -19,6 +19,7 @@ from bluepill_sim.program.functions import FunctionTable
 from bluepill_sim.program.image import Image
 from bluepill_sim.program.line_table import LineTable, read_lines
 from bluepill_sim.program.static_code import StaticBlock, StaticCode
+from simbase.timing import Nanos
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +40,8 @@ class FileCoverage:
     lines: dict[int, int] = field(default_factory=dict)
     #: Branches by line.
     branches: dict[int, list[BranchCount]] = field(default_factory=dict)
+    #: When each line that ran did so first, ns; 0 where that is not known.
+    first_ns: dict[int, Nanos] = field(default_factory=dict)
     #: (name, line, calls) of each function.
     functions: list[tuple[str, int, int]] = field(default_factory=list)
 
@@ -90,15 +93,27 @@ class FunctionCoverage:
 
 
 class Coverage:
-    """Counts what runs; a `BlockListener`."""
+    """Counts what runs; a `BlockListener`.
 
-    def __init__(self, image: Image, lines: LineTable, code: StaticCode) -> None:
+    Args:
+        image: The program.
+        lines: Its lines.
+        code: Its instructions.
+        ns_of: Says when a cycle was, by the clock of now; None: when what ran first is not wanted.
+    """
+
+    def __init__(
+        self, image: Image, lines: LineTable, code: StaticCode, ns_of: Callable[[int], Nanos] | None = None
+    ) -> None:
+        self._ns_of = ns_of
         self._image = image
         self._table = lines
         self._code = code
         self._functions = FunctionTable(image)
         #: How often each block was followed by each other.
         self._edges: Counter[tuple[int, int | None]] = Counter()
+        #: When each was so first, ns.
+        self._first_ns: dict[tuple[int, int | None], Nanos] = {}
         #: The block that ends with each conditional branch.
         self._conditional: dict[int, StaticBlock] = {}
 
@@ -133,7 +148,10 @@ class Coverage:
 
     def block(self, address: int, following: int | None, cycle: int, cycles: int) -> None:  # noqa: ARG002 - a listener
         """Count a block."""
-        self._edges[address, following] += 1
+        edge = address, following
+        if self._ns_of is not None and edge not in self._edges:
+            self._first_ns[edge] = self._ns_of(cycle)
+        self._edges[edge] += 1
 
     def enter(self, number: int, cycle: int) -> None:
         """Exceptions count for nothing here."""
@@ -153,6 +171,15 @@ class Coverage:
             for address in self._code.block(start).executed(following):
                 counts[address] = counts.get(address, 0) + times
         return counts
+
+    def first_ns(self) -> dict[int, Nanos]:
+        """Return when each instruction that ran did so first, by address; 0 where that is not known."""
+        found: dict[int, Nanos] = {}
+        for edge in self._edges:
+            at = self._first_ns.get(edge, 0)
+            for address in self._code.block(edge[0]).executed(edge[1]):
+                found[address] = min(at, found.get(address, at))
+        return found
 
     def branches(self) -> dict[int, tuple[int, int]]:
         """Return (taken, not taken) of every conditional branch, by address."""
@@ -249,10 +276,13 @@ class Coverage:
     def files(self) -> list[FileCoverage]:
         """Return what has run of each source file, by name."""
         found: dict[str, FileCoverage] = {}
-        counts = self.instructions()
+        counts, first_ns = self.instructions(), self.first_ns()
         for row in self._table.rows:
             file = found.setdefault(row.file, FileCoverage(row.file))
             file.lines[row.line] = max(file.lines.get(row.line, 0), counts.get(row.address, 0))
+            if row.address in first_ns:
+                at = first_ns[row.address]
+                file.first_ns[row.line] = min(at, file.first_ns.get(row.line, at))
         for address, (taken, not_taken) in sorted(self.branches().items()):
             place = self._table.at(address)
             if place is not None:

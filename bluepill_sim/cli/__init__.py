@@ -7,10 +7,15 @@ from bluepill_sim.cli.browser import page
 from bluepill_sim.cli.comparisons import compare_cores, compare_silicon, races
 from simbase.command_line.help_pages import VerbPage
 
-HELP = """Run, look into and debug a BluePill program, without a robot.
+HELP = """Run, inspect and debug a BluePill program, without a robot.
 
-FIRMWARE is an ELF, HEX or BIN file for an STM32F103C8; with debug information
+FIRMWARE is an ELF, HEX or BIN file for an STM32F103C8. With debug information
 in the ELF, places are shown by symbol and line.
+
+\b
+Examples:
+  {program} run mine.elf              one second of virtual time
+  {program} pins mine.elf --for 2s    what each pin did
 """
 
 

@@ -21,14 +21,14 @@ from simbase.units import PERCENT
 HELP = """Show which lines and branches of a firmware run.
 
 Compile with -Og -g: lines come from the ELF's debug information. Without it the
-table is by function, without symbols by address. With --lcov the result is also
-written as an lcov tracefile, which genhtml, editors and CI services read.
+table is by function; without symbols, by address. --lcov also writes an lcov
+tracefile for genhtml, editors and CI services.
 
 \b
 Examples:
   {program} coverage mine.elf --for 5s                     a summary by file
   {program} coverage mine.elf --lcov mine.info             for genhtml mine.info -o html
-  {program} coverage mine.elf --drive PA6=1@3.5s --missed  what nothing reached
+  {program} coverage mine.elf --drive PA6=1@3.5s --missed  code that did not run
   {program} coverage mine.elf --fail-under 80              exit code 1 below 80 % of the lines
 """
 

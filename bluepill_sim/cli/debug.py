@@ -13,18 +13,17 @@ from bluepill_sim.debug.machine import LoneChip
 from simbase.command_line.gdb_option import GDB_PORT
 from simbase.units import PORT
 
-HELP = """Let GDB run, stop, look into and rewind a firmware.
+HELP = """Serve a firmware to GDB: run, stop, inspect and rewind it.
 
-Breakpoints and watchpoints without limit, single steps, reverse-step and
-reverse-continue, semihosting, all registers and memories; `monitor help` lists
-what GDB has no word for. Time is virtual and stands still at a halt: nothing
-runs away while you think.
+It offers unlimited breakpoints and watchpoints, single steps, reverse-step,
+reverse-continue, semihosting, and all registers and memories; `monitor help`
+lists further commands. Virtual time stands still at a halt.
 
 \b
 Examples:
   {program} debug mine.elf                  then: gdb-multiarch mine.elf -ex "target remote :3333"
   {program} debug mine.elf --fast           virtual time as fast as it can
-  {program} debug mine.elf --uart log.txt   what it sends on USART1 goes to a file
+  {program} debug mine.elf --uart log.txt   its USART1 output goes to a file
 """
 
 

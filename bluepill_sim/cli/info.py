@@ -14,14 +14,15 @@ from bluepill_sim.program.image import Image
 from bluepill_sim.stm32f103 import FLASH_BYTES, SRAM_BYTES
 from simbase.timing import NS_PER_S, Nanos
 
-HELP = """Show what a firmware is, and what it uses that is not modelled.
+HELP = """Show a firmware's properties, and its use of unmodelled hardware.
 
-Sections, sizes, vectors, largest symbols, stack. It is also run for a moment.
+It shows sections, sizes, vectors, largest symbols and stack, and runs the
+firmware briefly.
 
 \b
 Examples:
   {program} info mine.elf             all of it
-  {program} info mine.elf --for 10s   look longer for what is not modelled
+  {program} info mine.elf --for 10s   run longer, to find more unmodelled use
   {program} info mine.elf --json      one JSON object
 """
 

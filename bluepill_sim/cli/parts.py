@@ -20,7 +20,7 @@ HELP = """List the parts that can be attached, with their pins and settings.
 \b
 Examples:
   {program} parts             all of them
-  {program} parts ssd1306     one of them: what it can be told
+  {program} parts ssd1306     the settings of one
 """
 
 

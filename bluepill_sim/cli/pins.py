@@ -15,19 +15,17 @@ from bluepill_sim.cli.driving import parse_changes, print_fault, print_status, r
 from bluepill_sim.cli.quantities import Drive, Firmware, JsonOutput, Span
 from simbase.timing import NS_PER_S
 
-HELP = """Run a firmware for a while, then show what each pin is and did.
+HELP = """Show each pin's state and activity after running a firmware.
 
-Mode, level (of PWM frequency and share of the time at 1), who drives it, edges.
-
-With --vcd or --sr the pins are also written as waveforms, with the interrupt
-lines and what the USARTs send beside them.
+It shows mode, level (for PWM, frequency and duty), driver and edges. --vcd or
+--sr also write waveforms, with interrupt lines and USART output.
 
 \b
 Examples:
   {program} pins mine.elf                                  pins in use after one second
-  {program} pins mine.elf --all                            every pin that has a leg
+  {program} pins mine.elf --all                            every pin of the package
   {program} pins mine.elf --for 5s --vcd a.vcd --sr a.sr   for GTKWave and PulseView
-  {program} pins mine.elf --drive PA6=1@3.5s               with something on an input
+  {program} pins mine.elf --drive PA6=1@3.5s               with a level on an input
 """
 
 

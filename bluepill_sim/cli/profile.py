@@ -21,11 +21,10 @@ from bluepill_sim.program.static_code import StaticCode
 from simbase.files import write_text
 from simbase.timing import NS_PER_S
 
-HELP = """Run a firmware for a while and show where its cycles go.
+HELP = """Profile a firmware: show where its cycles go.
 
-By function: calls, cycles of its own, cycles with what it calls. Then how deep
-the stack went, how long each interrupt waited and ran, and what the firmware
-touched that is not modelled.
+By function: calls, own cycles, cycles with callees. Then stack depth, each
+interrupt's wait and run time, and unmodelled accesses.
 
 \b
 Examples:

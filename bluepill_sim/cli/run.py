@@ -32,29 +32,31 @@ from simbase.errors import UsageError
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos, Reason
 from simbase.units import BAUD, PORT
 
-HELP = """Boot a firmware on an emulated BluePill.
+HELP = """Run a firmware on an emulated BluePill.
 
-What it sends on USART1 goes to stdout, as text: what would act on a terminal is written as \\x1b and the like, unless
---raw. Time is virtual: a program that sleeps runs much faster than real time. Exit
-code 1: the firmware died of a fault, or the wall clock's budget was used up;
-then the last blocks that it ran are shown. Resets are no failure (a watchdog may be
-what is tried): the last line counts them, by cause. 100 in a row within a millisecond of each other, with no change at
-a pin and no character meanwhile, are: such a program is ended.
+USART1 goes to stdout as text; control characters appear as \\x1b and the like
+unless --raw. Time is virtual: a program that sleeps runs much faster than real
+time.
+
+Exit code 1: the firmware died of a fault, or the wall clock's budget was used
+up; its last blocks are shown. Resets are no failure; the last line counts them
+by cause. 100 resets, each within a millisecond of the last and without a pin
+change or character, end the program as failed.
 
 \b
 Examples:
   {program} run mine.elf                          one second of virtual time
-  {program} run mine.elf --for 2s --uart log.txt  what it prints goes to a file
-  {program} run mine.elf --realtime --uart pty:   talk to it with any terminal program, until Ctrl-C
-  {program} run mine.elf --itm log.txt            what ITM_SendChar prints, with times
-  {program} run mine.elf --drive PA6=1@500ms      something comes before a sensor
-  {program} run mine.elf --drive PA0=1.65V        what the ADC sees on a pin
+  {program} run mine.elf --for 2s --uart log.txt  its output goes to a file
+  {program} run mine.elf --realtime --uart pty:   a serial port for any terminal program
+  {program} run mine.elf --itm log.txt            the output of ITM_SendChar, with times
+  {program} run mine.elf --drive PA6=1@500ms      a level on an input
+  {program} run mine.elf --drive PA0=1.65V        a voltage for the ADC
   {program} run mine.elf --until "pin PC13 low"   up to an event
   {program} run mine.elf --attach ssd1306,on=I2C1 --parts shots      an OLED, and its picture at the end
   {program} run mine.elf --attach ./mine.py:Sensor,on=I2C1,x=3       a part of your own
-  {program} run mine.elf --usb pty:               plug it in: its USB serial port is a terminal here
-  {program} run mine.elf --can vcan0              its CAN on one of this machine; candump and cansend work
-  {program} run mine.elf --can udp:127.0.0.1:29536     the same without SocketCAN: a frame is a datagram
+  {program} run mine.elf --usb pty:               plug in USB: its serial port is a terminal here
+  {program} run mine.elf --can vcan0              join its CAN to SocketCAN: candump, cansend
+  {program} run mine.elf --can udp:127.0.0.1:29536     the same by datagrams, without SocketCAN
   {program} run mine.elf --view              live on a page in the browser: pins, program, chip; halted and set back
   {program} run mine.elf --view --gdb        the page, and GDB at the same halt
 """

@@ -18,10 +18,11 @@ from bluepill_sim.program.line_table import read_lines
 from simbase.files import open_to_write_text
 from simbase.timing import NS_PER_MS, Nanos
 
-HELP = """Run a firmware and write what it executes.
+HELP = """Trace the instructions that a firmware executes.
 
-Cycle, symbol, source line. A line is a basic block, or the entry of or return from an exception; with
---calls only where another function begins. A loop to itself is one line.
+Each line is a basic block, or an exception's entry or return, with cycle,
+symbol and source line. --calls prints only changes of function. A loop to
+itself is one line.
 
 \b
 Examples:

@@ -5,20 +5,18 @@ Registers of peripherals are `BluePill.registers`. Everything is read as a debug
 Invariant: looking changes nothing, not even a status flag.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 from bluepill_sim.board import BluePill
 from bluepill_sim.core.nvic import FIRST_IRQ, VECTOR_COUNT, exception_name
 from bluepill_sim.debug.inspector import Inspector
 from bluepill_sim.debug.target_description import REGISTERS
 from bluepill_sim.program.elf_file import stack_top
-from bluepill_sim.program.line_table import read_lines, source_lines
+from bluepill_sim.program.line_table import read_lines
 from bluepill_sim.stm32f103 import FLASH_BASE, FLASH_BYTES_FITTED
 
-#: chosen: words of the stack, and lines around the one that comes next, that a screen shows beside other things.
-MOST_WORDS, LINES_AROUND = 32, 6
+#: chosen: words of the stack that a screen shows beside other things.
+MOST_WORDS = 32
 _CODE = ("pc", "lr")
 #: APSR's flags (ARMv7-M B1.4.2), from bit 31 down.
 _FLAGS = "NZCVQ"
@@ -58,13 +56,11 @@ class ClockRow:
 
 @dataclass(frozen=True, slots=True)
 class ProgramPlace:
-    """Where a program stands: the line that comes next, and those around it."""
+    """Where a program stands: the line that comes next."""
 
     file: str
     line: int
     function: str
-    #: Number and text of each; none where the file is not to be had.
-    around: tuple[tuple[int, str], ...] = ()
 
 
 def core_rows(board: BluePill) -> list[CoreRow]:
@@ -146,12 +142,4 @@ def source_place(board: BluePill) -> ProgramPlace | None:
     row = read_lines(board.image).at(board.pc)
     if row is None:
         return None
-    text = source_lines(row.file, Path(board.image.name).parent)
-    first, last = max(1, row.line - LINES_AROUND), min(len(text), row.line + LINES_AROUND)
-    function = board.image.symbols.where(board.pc).partition("+")[0]
-    return ProgramPlace(row.file, row.line, function, tuple(_numbered(text, first, last)))
-
-
-def _numbered(text: list[str], first: int, last: int) -> Iterator[tuple[int, str]]:
-    for number in range(first, last + 1):
-        yield number, text[number - 1]
+    return ProgramPlace(row.file, row.line, board.image.symbols.where(board.pc).partition("+")[0])

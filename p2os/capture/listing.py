@@ -297,6 +297,26 @@ def rows_of(
     yield from lister.finish(last_ns)
 
 
+def frame_row(data: bytes, *, at_ns: Nanos, direction: Direction | None, name: str, reading: Reading) -> ListingRow:
+    """Return the row of a sound frame of which all but its fields is known.
+
+    Args:
+        data: Its bytes on the wire.
+        at_ns: When its last byte had come.
+        direction: Who sent it.
+        name: As its row had it.
+        reading: By which its fields are read.
+    """
+
+    def describe(data: bytes) -> dict[str, Plain]:
+        if direction is Direction.FROM_ROBOT:
+            return PacketFields(reading.profile, reading.parameters).fields_of(data)
+        return command_fields(data)
+
+    kind = data[PREFIX_BYTES]
+    return ListingRow(at_ns=at_ns, direction=direction, data=data, kind=kind, name=name, describe=describe)
+
+
 def line_of(row: ListingRow, *, has_time: bool = True) -> str:
     """Return a row as one line."""
     time = f"{row.at_ns / NS_PER_S:10.6f} s  " if has_time else ""

@@ -17,6 +17,8 @@ from simbase.timing import Nanos
 
 #: chosen: runs of rows of which the index has least and greatest.
 RUN = 64
+#: chosen: more rows than pixels by so many are thinned.
+ROWS_A_PIXEL = 4
 
 
 class Extremes:
@@ -49,6 +51,9 @@ class Extremes:
 
     def within(self, first: int, last: int) -> tuple[int, int]:
         """Return the rows with the least and the greatest value from `first` to before `last`, of one row at least."""
+        if last - first <= RUN:  # most pixels of most runs
+            piece, find = self._values[first:last], self._values.index
+            return find(min(piece), first), find(max(piece), first)
         least, greatest = list[int](), list[int]()
         level = 0
         while True:
@@ -80,6 +85,8 @@ class Extremes:
 
 def buckets(times: Sequence[int], first: int, last: int, pixels: int) -> Iterator[tuple[int, int]]:
     """Yield the first row of each pixel, and that behind its last; pixels without rows are none."""
+    if first >= last:
+        return
     begin, span = times[first], times[last - 1] - times[first] + 1
     row = first
     while row < last:
@@ -104,11 +111,25 @@ def curve(times: Sequence[int], indices: Sequence[Extremes], first: int, last: i
     """Return rows: of each pixel the first and the last, and the least and the greatest by each index."""
     rows: list[int] = []
     for row, end in buckets(times, first, last, pixels):
+        if end - row <= 2:
+            rows += range(row, end)
+            continue
         chosen = {row, end - 1}
         for index in indices:
             chosen.update(index.within(row, end))
         rows += sorted(chosen)
     return rows
+
+
+def curve_of(times: Sequence[int], columns: Sequence[Sequence[float]], pixels: int) -> Sequence[int]:
+    """Return the rows that so many pixels show of whole columns: all where that is four a pixel at most."""
+    if len(times) <= ROWS_A_PIXEL * pixels:
+        return range(len(times))
+    indices = []
+    for column in columns:
+        indices.append(Extremes())
+        indices[-1].grow(column)
+    return curve(times, indices, 0, len(times), pixels)
 
 
 def thinned_list(severity: Callable[[int], int], first: int, last: int, most: int) -> list[int]:
@@ -129,11 +150,11 @@ def thinned_list(severity: Callable[[int], int], first: int, last: int, most: in
 
 def nearest(values: ColumnValues, width: int) -> "array[float]":
     """Return the least number of each row of a wide column, NaN aside; infinite where there is none."""
-    cells = cast("array[float]", values)
-    return array("d", [
-        min((cell for cell in cells[at : at + width] if cell == cell), default=float("inf"))  # noqa: PLR0124 - no NaN
-        for at in range(0, len(cells), max(width, 1))
-    ])  # fmt: skip
+    far = float("inf")
+    cells = [cell if cell == cell else far for cell in cast("array[float]", values)]  # noqa: PLR0124 - no NaN
+    if width <= 1:
+        return array("d", cells)
+    return array("d", map(min, *(cells[place::width] for place in range(width))))
 
 
 def rows_in(times: Sequence[int], from_ns: Nanos, to_ns: Nanos) -> tuple[int, int]:

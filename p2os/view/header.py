@@ -294,7 +294,25 @@ class PageDrawing:
     shapes: Sequence[PictureShape] = ()
 
 
-PageBlock: TypeAlias = PageTable | PageText | PagePicture | PagePlot | PageList | PagePlan | PageDrawing
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PageSource:
+    """Lines of a source file, and which of them have run by the page's time."""
+
+    kind: Literal["source"] = "source"
+    #: The file.
+    title: str = ""
+    lines: Sequence[str] = ()
+    #: Number of the first of them.
+    first: int = 1
+    #: When each ran first, ns: 0 where it is not known when, -1: not yet, -2: it has no code.
+    ran_ns: Sequence[Nanos] = ()
+    #: Numbers of lines with a branch that has run, and always gone the same way.
+    one_way: Sequence[int] = ()
+    #: Number of the line that comes next; 0: none of these.
+    next: int = 0
+
+
+PageBlock: TypeAlias = PageTable | PageText | PagePicture | PagePlot | PageList | PagePlan | PageDrawing | PageSource
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -316,6 +334,8 @@ class PanelHeader:
     title: str
     #: What one may look at in it; none: it is one thing.
     choices: Sequence[str] = ()
+    #: What it shows of a run that is over; of one that goes on `PanelState` tells.
+    sections: Sequence[PageSection] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -398,7 +418,7 @@ class Answered:
 
 __all__ = [
     "Answered", "ChannelHeader", "FaultOffer", "HandsOffer", "PageBlock", "PageCell", "PageCurve", "PageDrawing",
-    "PageHeader", "PageList", "PagePicture", "PagePlan", "PagePlot", "PageSection", "PageTable", "PageText",
-    "PanelHeader", "PanelState", "PictureShape", "RobotHeader", "SensorPlace", "Standing", "StateTransition",
-    "Wanted", "WordOffer", "WorldHeader", "WorldThing",
+    "PageHeader", "PageList", "PagePicture", "PagePlan", "PagePlot", "PageSection", "PageSource", "PageTable",
+    "PageText", "PanelHeader", "PanelState", "PictureShape", "RobotHeader", "SensorPlace", "Standing",
+    "StateTransition", "Wanted", "WordOffer", "WorldHeader", "WorldThing",
 ]  # fmt: skip

@@ -5,11 +5,12 @@ and idle packets come again and again: each distinct one is explained once.
 """
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 
 from p2os.capture import Chunk, Direction, FollowedReading, Lister, ListingRow, Reading, explain
-from p2os.capture.listing import inside_of
+from p2os.capture.listing import frame_row, inside_of
+from p2os.protocol.frames import CHECKSUM_BYTES, PREFIX_BYTES
 from p2os.view.frames import LaterText
 from simbase.timing import Nanos
 
@@ -17,6 +18,7 @@ from simbase.timing import Nanos
 MOST_KEPT = 4096
 #: Who has sent a row, in its column.
 _SENDERS = {Direction.FROM_ROBOT: 0, Direction.TO_ROBOT: 1, None: 2}
+_DIRECTIONS = {number: direction for direction, number in _SENDERS.items()}
 #: Time, sender, bytes, name, what it says, fields, whether it is bad.
 PacketRow = tuple[Nanos, int, bytes, str, LaterText, LaterText, int]
 
@@ -45,6 +47,20 @@ class PacketRows:
         for row in self._lister.finish(now):
             yield self._row(row), row
 
+    def texts_again(self, sender: int, data: bytes, name: str) -> tuple[LaterText, LaterText]:
+        """Return what a sound packet says, and its fields, once those before it were taken."""
+        if sender == _SENDERS[Direction.FROM_ROBOT]:
+            self.reading.take(data[PREFIX_BYTES:-CHECKSUM_BYTES])
+        if self.reading.reading is not self._read_by:
+            self._explained.clear()
+            self._read_by = self.reading.reading
+        key = data, name
+        if key not in self._explained:
+            row = partial(_row_again, sender, data, name, self._read_by)
+            says, inside = partial(_says_again, row), partial(_fields_again, row, self._read_by)
+            self._explained[key] = LaterText(says), LaterText(inside)
+        return self._explained[key]
+
     def _row(self, row: ListingRow) -> PacketRow:
         if len(self._explained) >= MOST_KEPT or self.reading.reading is not self._read_by:
             self._explained.clear()
@@ -55,6 +71,18 @@ class PacketRows:
             self._explained[key] = made
         says, fields = self._explained[key]
         return row.at_ns, _SENDERS[row.direction], row.data, row.name, says, fields, int(not row.valid)
+
+
+def _row_again(sender: int, data: bytes, name: str, reading: Reading) -> ListingRow:
+    return frame_row(data, at_ns=0, direction=_DIRECTIONS[sender], name=name, reading=reading)
+
+
+def _says_again(row: Callable[[], ListingRow]) -> str:
+    return inside_of(row())
+
+
+def _fields_again(row: Callable[[], ListingRow], reading: Reading) -> str:
+    return _fields_of(row(), reading)
 
 
 def _fields_of(row: ListingRow, reading: Reading) -> str:

@@ -11,15 +11,13 @@ from dataclasses import dataclass, field, replace
 from typing import Any, cast
 
 from p2os.view.channels import BY_NAME, CellType, ChannelKind
-from p2os.view.detail import Extremes, changes, curve, nearest, rows_in, thinned_list
+from p2os.view.detail import ROWS_A_PIXEL, Extremes, changes, curve, nearest, rows_in, thinned_list
 from p2os.view.frames import NO_FLAGS, ColumnValues, FrameFlags, LaterText, ViewFrame, chosen_rows, empty_columns
 from p2os.view.header import ChannelHeader, PageHeader
 from simbase.timing import Nanos
 
 #: One cell of a row, or those of a wide column.
 Cell = int | float | str | LaterText | bytes | Sequence[float]
-#: chosen: more rows than pixels by so many are thinned.
-ROWS_A_PIXEL = 4
 #: chosen: rows of a list that are sent at once; a screen shows some fifty.
 LISTED_ROWS = 500
 #: By which columns the least and greatest of a pixel are chosen.
@@ -101,6 +99,10 @@ class ChannelTrack:
     def take_rows(self, other: "ChannelTrack", count: int) -> None:
         """Take the first rows of a channel of the same kind, before any of its own."""
         self._take(list(other.rows(0, count)))
+
+    def take_columns(self, columns: Iterable[ColumnValues]) -> None:
+        """Take rows as a frame has them, before any of its own."""
+        self._take([values if isinstance(values, array) else list(values) for values in columns])  # type: ignore[misc]  # of one type, as its kind has it
 
     def column(self, name: str) -> ColumnValues:
         """Return a column by its name."""

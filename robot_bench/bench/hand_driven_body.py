@@ -9,7 +9,7 @@ Invariant: a body that was never driven by hand makes the steps that it makes al
 from collections.abc import Callable, Sequence
 from typing import Any, cast
 
-from p2os.pioneer.body.contract import RobotBody, Wheels
+from p2os.pioneer.body.contract import BodyState, RobotBody, Wheels
 from simbase.errors import UsageError
 
 #: chosen: more than any motor of a small robot gives; what has masses is turned by no more, Nm.
@@ -26,6 +26,8 @@ class HandDrivenBody:
 
     def __init__(self, inner: RobotBody, track_m: float) -> None:
         self._inner, self._track_m = inner, track_m
+        #: Nanoseconds of a step.
+        self.dt_ns = inner.dt_ns
         #: Rim speeds that a hand wants, left and right, m/s; None: nobody drives.
         self._rims: tuple[float, float] | None = None
         self._is_powered = inner.is_powered
@@ -58,6 +60,11 @@ class HandDrivenBody:
         self._is_powered = is_powered
         self._inner.is_powered = is_powered or self._rims is not None
 
+    @property
+    def state(self) -> BodyState:
+        """The state after the last step."""
+        return self._inner.state
+
     def snapshot(self) -> object:
         """Return all that decides the future."""
         return self._inner.snapshot(), self._rims, self._is_powered
@@ -69,10 +76,13 @@ class HandDrivenBody:
         self._inner.restore(inner)
 
     def __getattr__(self, name: str) -> Any:
-        """Return what is the body's own."""
+        """Return what is the body's own; methods are looked for once."""
         if name == "_inner":
             raise AttributeError(name)
-        return getattr(self._inner, name)
+        found = getattr(self._inner, name)
+        if callable(found):
+            self.__dict__[name] = found
+        return found
 
     def _meet(self) -> None:
         """Let steps be the body's own, or as a hand wants."""

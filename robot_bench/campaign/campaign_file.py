@@ -50,8 +50,6 @@ CAMPAIGN = VersionedFormat("a campaign")
 FREE_M = 0.45
 #: chosen: a robot of 0.38 m passes with room on both sides.
 GAP_M = 0.9
-#: Of all files of campaigns: what varies, and what a stage sets.
-_Settings = Annotated[Mapping[str, object] | None, Key(doc="keys as of `--set`")]
 
 
 class SpanTable(Record):
@@ -61,7 +59,7 @@ class SpanTable(Record):
     to: Annotated[int | float, Key(kind="number", doc="the greatest")]
     step: Annotated[int | float | None, Key(kind="number", above=0, doc="from one value to the next")] = None
     tail: Annotated[Literal["even", "long"], Key(
-        doc="`long`: twice as much is half as often (of numbers above 0), for what costs as much as it is long"
+        doc="`long`: twice the value (above 0) is a quarter as frequent, for what costs as much as it is long"
     )] = "even"  # fmt: skip
 
 
@@ -75,7 +73,7 @@ class DrawTable(Record):
     heading_deg: Annotated[float | None, Key(least=-36_000, most=36_000, doc="counter-clockwise")] = None
     ahead_m: Annotated[float | None, Key(least=-1000, most=1000, doc="of the robot at its start")] = None
     aside_m: Annotated[float | None, Key(least=-1000, most=1000, doc="to the left of the robot at its start")] = None
-    gap_m: Annotated[float | None, Key(least=0, most=100, doc="off other things, in place of the file's")] = None
+    gap_m: Annotated[float | None, Key(least=0, most=100, doc="from other things; default the file's")] = None
 
 
 class DisturbTable(Record):
@@ -202,35 +200,49 @@ class CampaignTable(Record):
 
     version: Annotated[int, Key(least=1, most=CAMPAIGN.newest, doc="of these keys")] = CAMPAIGN.newest
     description: Annotated[str, Key(doc="one sentence")] = ""
-    scenario: Annotated[str, Key(doc="a name, or a file beside this one")]
-    firmware: Annotated[str | None, Key(doc="a file beside this one, in place of the scenario's")] = None
-    search: Annotated[str, Key(choices=tuple(SEARCHES), doc="who searches")] = "sobol"
-    seed: Annotated[int, Key(least=0, most=2**31 - 1, doc="of the search")] = 0
+    scenario: Annotated[str, Key(doc="a shipped scenario, or a file beside this one")]
+    firmware: Annotated[str | None, Key(doc="a file beside this one; default the scenario's")] = None
+    search: Annotated[str, Key(choices=tuple(SEARCHES), doc="[who proposes](campaigns.md#searches)")] = "sobol"
+    seed: Annotated[int, Key(least=0, most=2**31 - 1, doc="of the search, not of the runs")] = 0
     #: chosen: the set of runs depends on it, not on the workers.
-    batch: Annotated[int, Key(least=1, most=1024, doc="so many are asked for before any result comes back")] = 16
+    batch: Annotated[int, Key(least=1, most=1024, doc="points proposed before any result")] = 16
     near_misses: Annotated[int, Key(
-        least=0, most=1024, doc="of each batch so many that passed, those with the least margin, are run in full too"
+        least=0, most=1024, doc="passed points of each batch, least margin first, to run in full with what is left"
     )] = 1  # fmt: skip
-    gap_m: Annotated[float, Key(least=0, most=100, doc="between things that are drawn")] = GAP_M
-    free_m: Annotated[float, Key(least=0, most=100, doc="around the start")] = FREE_M
+    gap_m: Annotated[float, Key(least=0, most=100, doc="between drawn things")] = GAP_M
+    free_m: Annotated[float, Key(least=0, most=100, doc="around the robot's middle at its start")] = FREE_M
     swarm: Annotated[float, Key(
-        least=0, most=0.9, doc="so much of what varies, of the draws and of the disturbances each point turns off"
+        least=0, most=0.9, doc="part of the [features](campaigns.md#swarm) that each point turns off"
     )] = 0.0  # fmt: skip
     corpus: Annotated[str | None, Key(
-        doc="a file beside this one, there or not: points that reached something new, kept for the next campaign"
+        doc="a file of [points](campaigns.md#reached-and-not) for the next campaign; it need not exist"
     )] = None  # fmt: skip
-    budget: Annotated[Budget, Key(doc="how much may be spent")] = field(default_factory=Budget)
-    limits: Annotated[RunLimits, Key(doc="what one run may take")] = field(default_factory=RunLimits)
-    cheap: _Settings = None
-    full: _Settings = None
-    vary: _Settings = None
-    draw: Annotated[tuple[Table, ...], Key(record=DrawTable, doc="things that are drawn")] = ()
-    disturb: Annotated[tuple[Table, ...], Key(record=DisturbTable, doc="faults that are drawn")] = ()
-    reach: Annotated[tuple[Table, ...], Key(record=ToReachTable, doc="what one point at least has to reach")] = ()
+    budget: Annotated[Budget, Key(doc="of the campaign")] = field(default_factory=Budget)
+    limits: Annotated[RunLimits, Key(doc="of one run; one above them has no verdict")] = field(
+        default_factory=RunLimits
+    )
+    cheap: Annotated[Mapping[str, object] | None, Key(
+        doc='settings of the proposing runs, any key of a scenario; default `body = "kinematic"`'
+    )] = None  # fmt: skip
+    full: Annotated[Mapping[str, object] | None, Key(doc="settings of the confirming runs; default the scenario's")] = (
+        None
+    )
+    vary: Annotated[Mapping[str, object] | None, Key(
+        doc="each key of [`--set`](scenarios.md#files-of-files), with its values"
+    )] = None  # fmt: skip
+    draw: Annotated[
+        tuple[Table, ...], Key(record=DrawTable, doc="[things](campaigns.md#things-that-are-drawn) in the way")
+    ] = ()
+    disturb: Annotated[
+        tuple[Table, ...], Key(record=DisturbTable, doc="[faults](campaigns.md#faults-that-are-drawn)")
+    ] = ()
+    reach: Annotated[
+        tuple[Table, ...],
+        Key(record=ToReachTable, doc="what one point at least [has to reach](campaigns.md#reached-and-not)"),
+    ] = ()
     goal: Annotated[tuple[Table, ...], GOALS] = ()
     keeps: Annotated[tuple[str, ...], Key(
-        kind="list", doc="kinds of the scenario's own goals that hold beside those of this file; a run that misses one "
-        "ends"
+        kind="list", doc="kinds of the scenario's goals to keep beside the file's; a run that misses one ends"
     )] = ()  # fmt: skip
 
 

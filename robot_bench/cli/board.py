@@ -20,18 +20,24 @@ BLUEPILL_BAUD, ADAPTER_BAUD = 57_600, 115_200
 #: chosen: many times what an answer takes, on a busy machine too; a module in reset costs it.
 ANSWER_S = 1.0
 
-HELP = """Test an adapter board: every wire, from end to end.
-
-The BluePill runs board_test.elf, the ESP32 the adapter's firmware; both consoles
-are driven from here. No robot may be at the board: the wires are toggled.
-
-With --emulated it is a board without electronics, for a look, or for a try with
-faults: open:DD3, unsoldered:DD3, gnd:DD3, 3v3:DD3, short:DD3,DD4, swapped:DD3,DD4;
-with @esp32 behind it the fault is at the ESP32's end.
+GROUP_HELP = """Test an adapter board.
 
 \b
 Examples:
-  p2os board test --emulated                  what a sound board's table looks like
+  p2os board test --emulated    every wire of a simulated board
+"""
+HELP = """Test an adapter board: every wire, end to end.
+
+The BluePill runs board_test.elf, the ESP32 the adapter's firmware; this verb
+drives both consoles. Disconnect the robot first: the wires are toggled.
+
+--emulated tests a simulated board, also with faults: open:DD3, unsoldered:DD3,
+gnd:DD3, 3v3:DD3, short:DD3,DD4, swapped:DD3,DD4; append @esp32 for a fault at
+the ESP32's end.
+
+\b
+Examples:
+  p2os board test --emulated                  a simulated board without faults
   p2os board test --emulated --fault open:DD3  DD3 is named, exit code 1
   p2os board test --adapter serial:/dev/ttyUSB0 --bluepill serial:/dev/ttyUSB1
 """
@@ -39,7 +45,7 @@ Examples:
 
 def register(app: typer.Typer) -> None:
     """Add the verb."""
-    board = typer.Typer(help="Test an adapter board.")
+    board = typer.Typer(help=GROUP_HELP)
     board.command("test", help=HELP)(walk_through)
     app.add_typer(board, name="board", rich_help_panel=BENCH)
 

@@ -21,16 +21,16 @@ from simbase.trust import Code, Trust
 
 HELP = """Check scenario files without running them.
 
-Keys, ranges, names, events in words, firmware, world, parts and wires are looked
-at, in all files that a scenario includes, with every value that it sweeps: keys and
-names in each row, parts and wires in one row with each value. Nothing that a file
-names is executed: of Python code only whether its file is there is looked at.
+Checked are keys, ranges, names, events, firmware, world, parts and wires, in
+all included files. Keys and names are checked in each row of a sweep, parts and
+wires in one row for each value. Nothing is executed: Python files need only
+exist.
 
 Exit code: 0 all can be run, 1 one cannot.
 
 \b
 Examples:
-  p2os check patrol.toml                    what it is, or what is wrong, with its line
+  p2os check patrol.toml                    a summary, or errors with their lines
   p2os check tests/*.toml
   p2os check --schema > scenario.schema.json   for editors that check TOML
 """

@@ -17,11 +17,10 @@ if TYPE_CHECKING:
 
 HELP = """Compare a logic analyser's capture with a run of the same program.
 
-RUN is a run folder, or the pins of `p2os mcu pins --vcd`. CAPTURE is a VCD, a
-sigrok session (.sr) or Saleae's CSV. When the capture began and by how much the
-board's clock differs from the analyser's is found from the edges; then each edge
-is explained by one of the run, or not. Channels that are named like pins need no
---wire.
+RUN is a run folder, or the output of `p2os mcu pins --vcd`. CAPTURE is a VCD, a
+sigrok session (.sr) or Saleae's CSV. Start time and clock difference are found
+from the edges; then each edge is explained by the run, or not. Channels named
+like pins need no --wire.
 
 Exit code: 0 every edge is explained, 1 one is not, 2 wrong usage or file.
 

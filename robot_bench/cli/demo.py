@@ -19,9 +19,14 @@ from simbase.units import TIME
 
 HELP = """Watch a BluePill program drive a Pioneer around obstacles.
 
-The shipped program `dodge`, unmodified, for 120 s of virtual time: emulated
-BluePill, adapter, P2OS line, virtual Pioneer with the best body that is installed:
-PyBullet, else MuJoCo, else the plan view.
+It runs the shipped program `dodge` for 120 s of virtual time on an emulated
+BluePill, with adapter, P2OS line and virtual Pioneer. The body is the best that
+is installed: PyBullet, else MuJoCo, else the plan view.
+
+\b
+Examples:
+  p2os demo                    the whole run, with a report
+  p2os demo --duration 20s     a shorter one
 """
 
 

@@ -15,15 +15,15 @@ from simbase.timing import NS_PER_S
 
 #: chosen: so many signals are listed, the first that part.
 MOST_SIGNALS = 8
-HELP = """Tell where two runs part: the first difference of each signal.
+HELP = """Compare two runs and show each signal's first difference.
 
-Of several robots each is shown with the robot's name.
+With several robots, each difference names its robot.
 
 Exit code: 0 they are alike, 1 they differ.
 
 \b
 Examples:
-  p2os diff runs/dodge-001 runs/dodge-002     what differs first, when, and what came before
+  p2os diff runs/dodge-001 runs/dodge-002     first differences, times, and events before them
 """
 
 

@@ -34,28 +34,29 @@ from simbase.files import lines_of, sha256_of
 from simbase.timing import NS_PER_S
 from simbase.trust import Trust
 
-HELP = """Say why a run failed: from the sensor to the wheel, with times.
+HELP = """Trace a run's failure from the sensor to the wheel, with times.
 
-The chip is run again with the levels that its pins had, and once more with one of
-them changed: so each step is recorded or shown. Where nothing shows the cause it
-says so.
+The chip runs again with its recorded pin levels, then with one of them changed,
+so each step is recorded or demonstrated. An unknown cause is reported as such.
 
-RUN is a run folder or its trace; of several robots each is explained. A trace without a verdict is judged by SCENARIO's
-goals; GOAL is a part of the failure's text, where there are several.
+RUN is a run folder or its trace; each of several robots is explained. A trace
+without a verdict is judged by SCENARIO's goals; GOAL selects a failure by part
+of its text.
 
-With a version that passes (--against) the source line is named by which the two differ. RUN may be the folder of a
-campaign, too: without a version that passes, each instruction that ran is then changed, one at a time, and a line is
-named where only its changes make the failing points pass, and no passing one fail.
+--against a version that passes names the source line by which the two differ.
+For a campaign's folder without such a version, each executed instruction is
+changed in turn; a line is named where only its changes make the failing points
+pass, and no passing one fail.
 
-Exit code: 0 explained, or nothing failed; 1 the cause is not known; 2 wrong usage.
+Exit code: 0 explained, or nothing failed; 1 cause unknown; 2 wrong usage.
 
 \b
 Examples:
   p2os explain runs/dodge-001                    what led to the first failure
-  p2os explain runs/mine-001 mine.toml latency   of the goals of mine.toml that one
-  p2os explain runs/mine-001 --against build/good.elf    what another program had done
-  p2os explain campaigns/dodge-001 --against build/good.elf    which line it is
-  p2os explain campaigns/dodge-001 --minutes 30  changed back, without a good one
+  p2os explain runs/mine-001 mine.toml latency   one goal of mine.toml
+  p2os explain runs/mine-001 --against build/good.elf    compared with another program
+  p2os explain campaigns/dodge-001 --against build/good.elf    the line that differs
+  p2os explain campaigns/dodge-001 --minutes 30  without a passing version
   p2os explain runs/mine-001 --json              one JSON object
 """
 

@@ -20,16 +20,12 @@ from simbase.user_classes import loaded
 #: Entry points that write the events of a run as a bag, each by the name of its storage.
 BAGS = "robot_bench.bags"
 
-HELP = """Make the report of a run anew, and all else in its folder.
+HELP = """Rebuild a run's report and other files from its trace.
 
-All of it is made from trace.jsonl. With --events what happened is written into a
-file instead: an event a line (.jsonl) or row (.parquet), or a scene with
-plots for Foxglove and Lichtblick (.mcap); with --ros2 as a rosbag2, in a folder.
-
-Of several robots it is the report of all, and their events in one order.
-
-A run that was killed has its trace up to the last virtual second: this makes
-the rest.
+trace.jsonl is the source. --events writes the events to a file instead: one per
+line (.jsonl) or row (.parquet), or a scene with plots for Foxglove and Lichtblick
+(.mcap); with --ros2, a rosbag2 folder. Several robots share one report and one
+order of events. A killed run has its trace up to the last virtual second.
 
 \b
 Examples:

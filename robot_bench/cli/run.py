@@ -58,14 +58,14 @@ HELP = """Run a scenario: a BluePill program drives a robot.
 
 The firmware boots on an emulated board, and its pins drive the robot.
 
-SCENARIO is one of those that ship (free-drive, motors, sensors, encoders, dodge,
+SCENARIO is a shipped one (free-drive, motors, sensors, encoders, dodge,
 rover, two-dodge)
-or a TOML file. What the options leave open is the scenario's. The run folder holds
-the trace, the pins as VCD and for PulseView, and report.html.
+or a TOML file. Options override its keys. The run folder holds the trace, the
+pins as VCD and for PulseView, and report.html.
 
 Exit code: 0 all goals were met, 1 one was missed or the run failed, 2 wrong
 usage or file, 130 interrupted (the run folder is complete up to there).
-However a run ends, its folder says so; --out never overwrites a run without --force.
+The run folder records how the run ended; --out overwrites one only with --force.
 
 \b
 Examples:
@@ -75,7 +75,7 @@ Examples:
   p2os run dodge --world arena --seed 7 --json      one JSON object for a script
   p2os run dodge --realtime                         at the speed of the clock
   p2os run dodge --seeds 0-99 -j 2 --junit r.xml    a run a seed, two at a time; a table
-  p2os run dodge --set threshold_m=0.4              any key of the scenario, otherwise
+  p2os run dodge --set threshold_m=0.4              another value for a scenario's key
   p2os run dodge --coverage --profile               lines, branches, cycles of the whole run
   p2os run dodge --coverage --fail-under 80         exit code 1 below 80 % of the lines
   p2os run dodge --gdb 3333                         under GDB; the robot stands still at a halt

@@ -71,6 +71,19 @@ def _setting(value: object) -> None:
     _text(cast("list[object]", value)[0])
 
 
+def _integer(value: object) -> None:
+    _need(type(value) is int and abs(value) < _MOST)
+
+
+def _function(value: object) -> None:
+    """Look at what has run of a function: its name and five counts."""
+    _need(isinstance(value, list) and len(value) == 6)
+    name, *counts = cast("list[object]", value)
+    _text(name)
+    for count in counts:
+        _integer(count)
+
+
 def _thing(value: object) -> None:
     _object(
         dict.fromkeys(("name", "kind", "shape"), _text)
@@ -109,12 +122,19 @@ _META = _object({
     "start": _object(dict.fromkeys(("x", "y", "heading"), _number)), "world": _known(_WORLD), "robot": _known(_ROBOT),
 })  # fmt: skip
 _MEASURED = _object(dict.fromkeys(("files", "table"), _each(_text)), ("files", "table"))
+_PROGRAM = _object({
+    "files": _each(_object(
+        {"name": _text, "lines": _each(_text), **dict.fromkeys(("ran_ns", "one_way"), _each(_integer))},
+        ("name", "lines", "ran_ns", "one_way"),
+    )),
+    "functions": _each(_function),
+}, ("files", "functions"))  # fmt: skip
 _END = _object({
     **dict.fromkeys(
         ("virtual_s", "wall_s", "real_time_factor", "distance_m", "usart_baud", "collisions", "min_clearance_m",
          "worst_lag_ms"), _known(_number),
     ),
-    **dict.fromkeys(("coverage", "profile"), _known(_MEASURED)),
+    **dict.fromkeys(("coverage", "profile"), _known(_MEASURED)), "program": _known(_PROGRAM),
     "parts": _known(_each(_object(dict.fromkeys(("name", "words", "png"), _text), ("name", "words")))),
     "trace_sha256": _known(_text), "explained": _known(_text), "passed": _known(_flag),
     **dict.fromkeys(("failures", "goals_met", "goals_not_judged", "notes", "last_blocks"), _known(_each(_text))),

@@ -21,6 +21,7 @@ from bluepill_sim.analysis.interrupts.latency import LatencyProbe
 from bluepill_sim.analysis.lcov import lcov_lines
 from bluepill_sim.analysis.observation import Observation
 from bluepill_sim.analysis.profile_text import exception_lines, function_lines
+from bluepill_sim.analysis.program_lines import program_lines
 from bluepill_sim.board import BluePill
 from bluepill_sim.program.functions import FunctionTable
 from bluepill_sim.program.line_table import read_lines
@@ -73,6 +74,7 @@ class Measurement:
                 texts["coverage.info"] = _joined(lcov_lines(files, sources=sources))
             table = coverage_lines(self.coverage, missed=False)
             facts["coverage"] = {"files": sorted(texts), "table": table, **_sums(self.coverage)}
+            facts["program"] = program_lines(self.coverage, sources)
         if self.profile is not None and self.latency is not None:
             waits = exception_lines(self.latency.by_name, self.board.hclk_hz)
             texts["profile.txt"] = _joined([f"profile of {title}", "", *function_lines(self.profile), *waits])
@@ -100,7 +102,7 @@ def measuring(board: BluePill, *, coverage: bool, profile: bool, fail_under: flo
         BluePillError: `fail_under` percent of the lines are asked for, and the program has no debug information.
     """
     code = StaticCode(board.chip.memory)
-    lines = Coverage(board.image, read_lines(board.image), code) if coverage else None
+    lines = Coverage(board.image, read_lines(board.image), code, board.chip.ns_of) if coverage else None
     if lines is not None and fail_under:
         refuse_without_lines(lines, board.image.name)
     cycles = CycleProfile(FunctionTable(board.image), code) if profile else None

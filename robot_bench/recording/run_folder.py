@@ -27,9 +27,11 @@ from simbase.files import reason_of, refuse_elsewhere
 RUNS = Path("runs")
 #: What was done by hand in a run, as a scenario that is that run without a page.
 HANDS_NAME = "hands.toml"
+#: A long run as its page shows it (`robot_bench.view.kept_recording`).
+KEPT_NAME = "page.p2vf"
 #: All that a run leaves in its folder.
 FILES = (
-    TRACE_NAME, VARIABLES_NAME, SUMMARY_NAME, HANDS_NAME, "report.html", "pins.vcd", "pins.sr", "wire.jsonl",
+    TRACE_NAME, VARIABLES_NAME, SUMMARY_NAME, HANDS_NAME, KEPT_NAME, "report.html", "pins.vcd", "pins.sr", "wire.jsonl",
     "usart.txt",
     "path.png", "speeds.png", "pins.png",
     "coverage.txt", "coverage.html", "coverage.info", "profile.txt", "profile.folded", "profile.svg",

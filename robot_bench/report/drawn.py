@@ -6,17 +6,19 @@ The page draws the run's channels (`robot_bench.view`); the plan with its labels
 from collections.abc import Sequence
 from typing import cast
 
+from p2os.view.detail import changes, curve_of
 from robot_bench.events.codec import Json
 from robot_bench.events.kinds import WorldChange
 from robot_bench.recording.run_record import RunRecord
 from robot_bench.recording.signals import grouped, levels_and_duties, motor_steps, pin_labels
 from robot_bench.recording.summary import verdict
 from robot_bench.report.plan import plan
-from robot_bench.report.thinning import extremes, pulses
 from simbase.timing import NS_PER_S
 
+#: chosen: one a pixel of the plots.
+PIXELS = 1200
 #: chosen: what a plot of some hundred pixels shows.
-PIN_BUCKETS = 500
+PIN_PIXELS = 500
 MOST_MOVES = 2000
 MOST_HITS = 500
 
@@ -58,13 +60,13 @@ def _changes(record: RunRecord) -> list[Json]:
 def _poses(record: RunRecord) -> list[list[float]]:
     poses = record.poses
     columns = [[getattr(pose, name) for pose in poses] for name in ("x", "y", "left", "right")]
-    kept = [poses[n] for n in extremes([pose.t for pose in poses], columns)]
+    kept = [poses[n] for n in curve_of([pose.t for pose in poses], columns, PIXELS)]
     return [[_seconds(p.t), *(round(value / 1e6, 4) for value in (p.x, p.y, p.heading, p.left, p.right))] for p in kept]
 
 
 def _motor(record: RunRecord, motor: int, step: float) -> list[list[float]]:
     steps = motor_steps(record.pins, motor)
-    kept = [steps[n] for n in extremes(steps.times, [steps.values])]
+    kept = [steps[n] for n in curve_of(steps.times, [steps.values], PIXELS)]
     return [[_seconds(t), value * step] for t, value in kept]
 
 
@@ -82,9 +84,9 @@ def _drawn(record: RunRecord, net: str) -> Sequence[tuple[int, float]]:
     """Return what is drawn of a net: its edges, and while it shows a wave its duty as a part of the level."""
     edges = record.pins[net]
     if net not in record.waves:
-        return pulses(edges, buckets=PIN_BUCKETS)
+        return [edges[row] for row, _ in changes(edges.times, 0, len(edges), PIN_PIXELS)]
     rows = levels_and_duties(record, net)
-    return [rows[n] for n in extremes([t for t, _ in rows], [[value for _, value in rows]], buckets=PIN_BUCKETS)]
+    return [rows[n] for n in curve_of([t for t, _ in rows], [[value for _, value in rows]], PIN_PIXELS)]
 
 
 def _seconds(ns: int) -> float:

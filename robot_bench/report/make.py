@@ -6,6 +6,7 @@ pins.vcd       all wires, exact to the nanosecond
 pins.sr        all wires, sampled, for PulseView
 wire.jsonl     P2OS bytes, one message a line
 usart.txt      what the firmware printed
+page.p2vf      of a long run: its page's rows (`robot_bench.view.kept_recording`)
 report.html    the report; where they are wanted PNG plots beside it
 
 What `--coverage` and `--profile` leave is not made from the trace, but by `robot_bench.recording.measurement`
@@ -21,13 +22,15 @@ from enum import IntEnum
 from pathlib import Path
 from types import ModuleType
 
+from p2os.view.page import page_of
 from robot_bench.events.codec import Json
 from robot_bench.recording.run_record import TRACE_NAME, RunRecord, read_run
 from robot_bench.recording.summary import outcome_of_all, write_outcome
 from robot_bench.recording.waveforms import write_sigrok, write_vcd
 from robot_bench.report.drawn import drawn_of
 from robot_bench.report.page_of_all import REPORT_NAME, write_report_of_all
-from robot_bench.report.run_page import render_run
+from robot_bench.report.run_page import run_report
+from robot_bench.view.kept_recording import is_long, keep
 from simbase.files import writing
 
 
@@ -78,7 +81,10 @@ def _plots() -> ModuleType | None:
 
 def _report_of(record: RunRecord, folder: Path, files: Files) -> ReportFiles:
     page = folder / REPORT_NAME
-    page.write_text(render_run(record), encoding="utf-8")
+    recording = run_report(record)
+    page.write_text(page_of(recording, all_is_in=TRACE_NAME), encoding="utf-8")
+    if is_long(folder):
+        keep(recording, folder)
     plots = _plots() if files >= Files.PLOTS else None
     return ReportFiles(page=page, plots=() if plots is None else plots.write_plots(drawn_of(record), folder))
 

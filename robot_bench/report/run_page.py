@@ -13,6 +13,7 @@ from p2os.view.recording import ViewRecording
 from robot_bench.events.codec import Json
 from robot_bench.recording.run_record import TRACE_NAME, RunRecord
 from robot_bench.recording.summary import EXPLAINED, MEASURED, figures
+from robot_bench.view.program_sections import program_panel_of
 from robot_bench.view.run_recording import recording_of
 
 
@@ -24,9 +25,11 @@ def render_run(record: RunRecord) -> str:
 def run_report(record: RunRecord, *, is_measured: bool = True) -> ViewRecording:
     """Return a run as the page shows it: rows and report; the drive's figures, which take a while, where wanted."""
     found = recording_of(record)
+    program = cast("Json", record.end.get("program") or {})
     found.header = replace(
-        found.header, lead=lead_of(record.meta), why=str(record.end.get(EXPLAINED) or ""),
-        sections=run_sections(record, is_measured=is_measured), footer=_footer(record),
+        found.header, panels=[program_panel_of(program)] if program else (), lead=lead_of(record.meta),
+        why=str(record.end.get(EXPLAINED) or ""), sections=run_sections(record, is_measured=is_measured),
+        footer=_footer(record),
     )  # fmt: skip
     return found
 

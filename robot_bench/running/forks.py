@@ -17,8 +17,11 @@ LOOK_S = 0.1
 
 
 def begin(work: Callable[..., None], *arguments: object) -> tuple[ForkProcess, Connection]:
-    """Begin `work(pipe, *arguments)` in a fork, which sends what comes of it; return it, and the pipe's other end."""
-    ours, theirs = get_context("fork").Pipe(duplex=False)
+    """Begin `work(pipe, *arguments)` in a fork, which sends what comes of it; return it, and the pipe's other end.
+
+    It may ask for more by the same pipe.
+    """
+    ours, theirs = get_context("fork").Pipe()
     process = get_context("fork").Process(target=_begun, args=(work, theirs, *arguments), daemon=True)
     process.start()
     theirs.close()

@@ -41,11 +41,11 @@ class VerbPage(TyperCommand):
 
     def format_help_text(self, ctx: typer.Context, formatter) -> None:  # type: ignore[no-untyped-def, override]  # noqa: ANN001 - click's or typer's own
         """Write what the help says, no line wider than the page."""
-        _write_text(formatter, _called(self.help, ctx))
+        _write_text(formatter, _called(self.help, (ctx.parent or ctx).command_path))
 
     def format_epilog(self, ctx: typer.Context, formatter) -> None:  # type: ignore[no-untyped-def, override]  # noqa: ANN001 - click's or typer's own
         """Write what stands at the end, likewise."""
-        _write_text(formatter, _called(self.epilog, ctx))
+        _write_text(formatter, _called(self.epilog, (ctx.parent or ctx).command_path))
 
     def collect_usage_pieces(self, ctx: typer.Context) -> list[str]:  # type: ignore[override]  # noqa: ARG002 - typer's own
         """Return what follows the verb: arguments by their metavariables, in brackets where they may be left out."""
@@ -81,11 +81,11 @@ class VerbList(TyperGroup):
 
     def format_help_text(self, ctx: typer.Context, formatter) -> None:  # type: ignore[no-untyped-def, override]  # noqa: ANN001 - click's or typer's own
         """Write what the help says, no line wider than the page."""
-        _write_text(formatter, _called(self.help, ctx))
+        _write_text(formatter, _called(self.help, ctx.command_path))
 
     def format_epilog(self, ctx: typer.Context, formatter) -> None:  # type: ignore[no-untyped-def, override]  # noqa: ANN001 - click's or typer's own
         """Write what stands at the end, likewise."""
-        _write_text(formatter, _called(self.epilog, ctx))
+        _write_text(formatter, _called(self.epilog, ctx.command_path))
 
     def format_commands(self, ctx: typer.Context, formatter) -> None:  # type: ignore[no-untyped-def, override]  # noqa: ANN001 - click's or typer's own
         """Write the verbs, group by group, each with its first sentence."""
@@ -134,9 +134,9 @@ def first_sentence(text: str | None) -> str:
     return words.split(". ", maxsplit=1)[0].removesuffix(".")
 
 
-def _called(text: str | None, ctx: typer.Context) -> str | None:
-    """Return a text in which `{program}` is how the program was called that the verb is of."""
-    return text and text.replace(PROGRAM, ctx.parent.command_path if ctx.parent else ctx.command_path)
+def _called(text: str | None, program: str) -> str | None:
+    """Return a text in which `{program}` is how the list of its verbs was called."""
+    return text and text.replace(PROGRAM, program)
 
 
 def _write_text(formatter, text: str | None) -> None:  # type: ignore[no-untyped-def]  # noqa: ANN001 - as above

@@ -56,7 +56,10 @@ LIVES, LIFE_LIMIT_S = 120, 20
 #: What is asked where no life notices: waves, whole adapters, words.
 OWN_TESTS = "tests/adapter_sim"
 #: The same on the firmware's side: what no life exercises.
-UNITS = ("adapter_fw/selftest/units.cpp", "adapter_fw/selftest/robot.cpp")
+UNITS = (
+    *(f"adapter_fw/selftest/units/{name}.cpp" for name in ("main", "console", "parts")),
+    "adapter_fw/selftest/robot.cpp",
+)
 #: Operators of cosmic-ray that change no arithmetic or order: what they break is found by the type check.
 LEFT_OUT = ("RemoveDecorator", "ExceptionReplacer", "VariableReplacer", "VariableInserter", "KeywordReplacer")
 COMPILE = ("g++", "-std=c++17", "-O1", "-fPIC", "-w", "-fno-exceptions", "-fno-rtti")

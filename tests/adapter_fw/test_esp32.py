@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from adapter_sim.pinout import faults_of, load_pinout
-from tests.adapter_fw.builds import BUILD, ROOT, built, load_script
+from tests.adapter_fw.builds import BUILD, ROOT, load_script
 
 CHECK = load_script("adapter_fw/check_esp32.py")
 FIRMWARE = ROOT / "adapter_fw"
@@ -97,13 +97,6 @@ def test_the_project_compiles_every_source_of_the_esp32() -> None:
 def test_no_address_of_a_pad_and_no_password_stands_in_the_code() -> None:
     text = "".join(path.read_text(encoding="utf-8") for path in (FIRMWARE / "esp32").rglob("*.[ch]pp"))
     assert not re.search(r"(?:[0-9A-Fa-f]{2}:){5}[0-9A-Fa-f]{2}", text)
-
-
-@pytest.mark.parametrize("name", ["units", "library"])
-def test_checks_on_the_pc_hold(name: str, tmp_path: Path) -> None:
-    program, _ = built(name, tmp_path)
-    done = subprocess.run([program], capture_output=True, text=True, check=False, timeout=60)
-    assert (done.stdout, done.returncode) == ("ok\n", 0), done.stderr
 
 
 @needs_compiler

@@ -9,6 +9,7 @@ import pytest
 
 from adapter_sim import Adapter, AdapterSettings, EncoderAtOpen, parse_pinout
 from adapter_sim.adapter import AdapterState
+from adapter_sim.mixing import CommandedSpeeds
 from adapter_sim.session import SessionEnded
 from p2os.protocol.sip import SonarReading, StandardSip
 from simbase.errors import UsageError
@@ -290,6 +291,18 @@ def test_a_stalled_robot_is_plausible_and_reported(driving: Rig) -> None:
     assert ("stall", "left 1, right 0") in [event[1:] for event in driving.events]
 
 
+@pytest.mark.parametrize("wire", ["p2dx_con", "rst"])
+def test_what_the_sonar_said_is_forgotten_with_the_session(driving: Rig, wire: str) -> None:
+    driving.ms(1)
+    assert driving.adapter.status.ranges_um == (32_000 * 268,) * 8
+    assert driving.adapter.status.distances == (False,) * 8
+    driving.pins.set(wire, wire == "rst", driving.now)
+    driving.ms(20)
+    assert driving.adapter.state in {"closing", "reset"}
+    assert driving.adapter.status.ranges_um == (None,) * 8
+    assert driving.adapter.status.distances == (True,) * 8
+
+
 def test_bit_zero_of_the_flags_is_not_a_motor_flag(driving: Rig) -> None:
     driving.robot.sip = replace(driving.robot.sip, raw_flags=0)
     driving.pins.motors(2, 2, driving.now)
@@ -298,11 +311,19 @@ def test_bit_zero_of_the_flags_is_not_a_motor_flag(driving: Rig) -> None:
 
 
 def test_rst_wipes_all_but_the_encoders_and_releases_the_outputs(driving: Rig) -> None:
-    driving.robot.sip = replace(driving.robot.sip, raw_x=200)
+    driving.robot.sip = replace(driving.robot.sip, raw_x=9_000)
+    driving.ms(100)
+    driving.robot.sip = replace(driving.robot.sip, raw_x=9_200)
+    driving.pins.motors(2, 1, driving.now)
     driving.ms(200)
+    status = driving.adapter.status
+    assert (status.motors, status.speeds, status.odometry_jumps) == ((2, 1), CommandedSpeeds(94, -10), 1)
+    driving.pins.motors(0, 0, driving.now)
     driving.pins.set("rst", True, driving.now)
-    driving.ms(1)
-    assert driving.adapter.state == "reset"
+    driving.ms(2)
+    status = driving.adapter.status
+    assert (status.state, status.motors, status.speeds) == ("reset", (0, 0), CommandedSpeeds(0, 0))
+    assert (status.sips, status.odometry_jumps) == (0, 0)
     assert set(driving.pins.outputs.values()) == {None}
     since = driving.now
     driving.ms(1_000)

@@ -2,6 +2,7 @@
 
 import math
 import random
+from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
@@ -158,6 +159,14 @@ def test_a_jump_of_the_odometry_is_counted_and_left_out() -> None:
     assert (encoders.counts, encoders.jumps) == (before, 1)
     assert encoders.take(5_078, 0, 0)
     assert encoders.counts == (before[0] + 1, before[1] + 1)
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_half_of_all_positions_is_the_longest_jump_and_one_more_leads_the_other_way(side: int) -> None:
+    encoders = Encoders(replace(GEOMETRY, longest_step_um=0x3FFF * 840), 3)
+    encoders.begin()
+    for number, (there, is_travel) in enumerate(((0, True), (0x3FFF, True), (0x7FFF, False), (0x3FFF, False))):
+        assert encoders.take(*(there, 0) if side == 0 else (0, there), 0) is is_travel, number
 
 
 @given(st.integers(-(10**9), 10**9), st.integers(-(10**9), 10**9))

@@ -1,5 +1,6 @@
 """The pin-out file: what it says, and what it refuses."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -7,9 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from adapter_sim import PinoutError, load_pinout, parse_pinout
-from adapter_sim.pinout import Pull, Safe, WireDirection, WireRole, faults_of
+from adapter_sim.pinout import Pinout, Pull, Safe, WireDirection, WireRole, faults_of
 from tests.adapter_sim.conftest import PINOUT, four_bits
 from tests.adapter_sim.conftest import PINOUT_TEXT as TEXT
+from tests.tools.each_row import each_row
 
 #: The BluePill's side, which binaries rely on.
 FIXED = {
@@ -61,6 +63,65 @@ def test_rev_b_is_the_default_and_breaks_no_rule() -> None:
 )
 def test_the_thesis_revisions_have_faults(revision: str, fault: str) -> None:
     assert fault in faults_of(PINOUT, revision)
+
+
+#: By Espressif's data sheet of the ESP32: of the flash, without an output driver, read at boot.
+FLASH, NO_DRIVER, STRAPS = {6, 7, 8, 9, 10, 11}, {34, 35, 36, 37, 38, 39}, {0, 2, 5, 12, 15}
+#: Read together.
+SECOND_REGISTER = {32, 33, 34, 35, 36, 37, 38, 39}
+
+
+def with_pin(name: str, pin: str) -> Pinout:
+    """Return the pin-out with one wire on another pin of rev-b, and nothing but wires."""
+    wires = tuple(replace(wire, esp32=(("rev-b", pin),)) if wire.name == name else wire for wire in PINOUT.wires)
+    return replace(PINOUT, wires=wires, auxiliaries=())
+
+
+@each_row("gpio", range(40))
+def test_what_each_pin_of_the_esp32_can_bear(gpio: int) -> None:
+    pin = f"IO{gpio}"
+    for name, wrong in (
+        ("DD1", [*["carries the module's flash"] * (gpio in FLASH), *["is an input only"] * (gpio in NO_DRIVER)]),
+        ("p2dx_con", [*["carries the module's flash"] * (gpio in FLASH), *["is a boot strap"] * (gpio in STRAPS)]),
+    ):
+        found = [fault for fault in faults_of(with_pin(name, pin), "rev-b") if fault.startswith(f"{name}: {pin} ")]
+        taken = [fault for fault in found if fault.endswith(" already")]
+        assert len(found) - len(taken) == len(wrong)
+        assert all(why in fault for why, fault in zip(wrong, found, strict=False))
+    is_split = any(fault.startswith("motor wires") for fault in faults_of(with_pin("motor2_comm1", pin), "rev-b"))
+    assert is_split is (gpio not in SECOND_REGISTER)
+
+
+def test_a_motor_wire_on_no_pin_of_the_chip_is_not_sampled_with_the_others() -> None:
+    for pin in ("EN", "HC595.QA"):
+        faults = faults_of(with_pin("motor2_comm1", pin), "rev-b")
+        assert faults[-1] == "motor wires: not all in IO32..IO39, so no one read samples them at one instant"
+
+
+@each_row(
+    ("key", "least", "most"),
+    [("schema = 1", 1, 1), ("idle = 1", 0, 1), ("bit = 2", 0, 31), ("number = 8", 1, 32), ("width = 3", 1, 32)],
+)
+def test_numbers_of_the_file_have_their_bounds(key: str, least: int, most: int) -> None:
+    name = key.partition(" ")[0]
+    for number, is_in in ((least - 1, False), (least, True), (most, True), (most + 1, False)):
+        try:
+            parse_pinout(TEXT.replace(key, f"{name} = {number}", 1))
+            said = ""
+        except PinoutError as error:
+            said = str(error)
+        assert ("is out of range" in said) is not is_in, (number, said)
+
+
+@each_row("pin", ["PA0", "PA9", "PA10", "PA15", "PB14", "PC0"])
+def test_every_port_that_a_bluepill_brings_out_may_be_named(pin: str) -> None:
+    assert parse_pinout(TEXT.replace('bluepill = "PA4"', f'bluepill = "{pin}"', 1)).wire("DD1").bluepill == pin
+
+
+@each_row("pin", ["PA16", "PA20", "P15", "PA1x", "xPA1", "PD0", "PA"])
+def test_what_is_no_pin_of_a_bluepill_is_refused(pin: str) -> None:
+    with pytest.raises(PinoutError, match=r"expected PA0\.\.PC15"):
+        parse_pinout(TEXT.replace('bluepill = "PA4"', f'bluepill = "{pin}"', 1))
 
 
 def test_an_auxiliary_pin_that_a_wire_has_already_is_a_fault() -> None:

@@ -6,7 +6,7 @@
   place of the serial port.
 - Ports are replaced by free ones, `/tmp` and `/dev` by folders of the session.
 - Each line of output that the page shows has to come; numbers in it may be others, and `…` stands for anything.
-- A command whose shown output has a line `p2os: …`, `fault: …` or `FAILED …` has to fail; any other has to end with 0.
+- A command whose shown output has a line `p2os: …`, `fault: …` or `FAILED…` has to fail; any other has to end with 0.
 """
 
 import contextlib
@@ -41,7 +41,7 @@ LIMIT_S = 240.0
 READY_S = 60.0
 ENDING_S = 60.0
 PORTS = 24
-FAILURES = ("p2os: ", "fault: ", "FAILED ", "depends: ")
+FAILURES = ("p2os: ", "fault: ", "FAILED ", "FAILED;", "depends: ")
 NAMED_FILE = re.compile(r"^(?:/\*|//|#)\s*(?P<name>[\w./-]+\.(?:c|h|ld|toml|py|yml|yaml))\b")
 TCP = re.compile(r"(?<=tcp:127\.0\.0\.1:)\d+|(?<=--gdb )\d+|(?<=remote :)\d+")
 PLACE = re.compile(r"(?:tcp:127\.0\.0\.1:\d+|(?:serial|pty):/[^?'\s]+)")

@@ -1,7 +1,6 @@
 """The public face of each package: a flat, short `__all__`, fetched on first use, and documented page by page."""
 
 import ast
-import runpy
 import subprocess
 import sys
 from importlib import import_module
@@ -58,29 +57,26 @@ def test_a_name_that_a_package_has_not_is_reported_as_python_tells_it() -> None:
 
 
 @pytest.fixture
-def api_pages() -> dict[str, Any]:
+def api() -> Any:
     pytest.importorskip("pdoc", reason="pdoc comes with the extra dev")
-    return runpy.run_path(str(ROOT / "tools" / "make_api_pages.py"))
+    return import_module("tools.website.api")
 
 
 @pytest.mark.slow
-def test_the_pages_of_the_api_are_made_without_a_warning_and_every_public_name_is_documented(
-    api_pages: dict[str, Any], tmp_path: Path
-) -> None:
-    assert api_pages["make"](tmp_path) == []
-    page = (tmp_path / "robot_bench.html").read_text(encoding="utf-8")
-    assert all(
-        f'id="Bench.{name}"' in page for name in ("from_scenario", "run_until", "pose", "level", "text", "judge")
-    )
-    assert set(PACKAGES) <= {path.stem for path in tmp_path.glob("*.html")}
+def test_the_pages_of_the_api_are_made_without_a_warning_and_every_public_name_is_documented(api: Any) -> None:
+    made, wrong = api.pages()
+    assert wrong == []
+    page = made["reference/api/robot_bench.md"]
+    assert all(f"#Bench.{name} }}" in page for name in ("from_scenario", "run_until", "pose", "level", "text", "judge"))
+    assert {f"reference/api/{package}.md" for package in PACKAGES} <= made.keys()
 
 
 def test_public_names_without_a_docstring_are_reported(
-    api_pages: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    api: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     source = '"""A module."""\nclass Told:\n    """It is."""\n    def bare(self): ...\ndef told(): ...\n'
     (tmp_path / "face_to_look_at.py").write_text(source, encoding="utf-8")
     monkeypatch.syspath_prepend(tmp_path)
-    assert api_pages["make"](tmp_path, ("face_to_look_at",)) == [
+    assert api.pages(("face_to_look_at",))[1] == [
         "face_to_look_at.Told.bare has no docstring", "face_to_look_at.told has no docstring",
     ]  # fmt: skip

@@ -196,6 +196,25 @@ def test_the_nearest_tests_are_those_of_the_mirror_then_those_that_ran_the_line(
     assert "tests/p2os/protocol/test_protocol_page.py" in counted.of("p2os/protocol/command_table.py", 1)
 
 
+def test_a_file_of_tests_says_by_its_helpers_and_its_data_too(tmp_path: Path) -> None:
+    folder = tmp_path / "tests" / "walks"
+    folder.mkdir(parents=True)
+    (tmp_path / "tests" / "machine.py").write_text("x = 1\n", encoding="utf-8")
+    for name, text in (
+        ("test_one.py", "from tests.walks.approved import judge\n"),
+        ("test_other.py", "import pytest\n"),
+        ("approved.py", "from tests.walks.walker import Walker\n"),
+        ("walker.py", "from tests.machine import x\n"),
+        ("approved.json", "{}"),
+    ):
+        (folder / name).write_text(text, encoding="utf-8")
+    nearest = Nearest(tmp_path, {})
+    beside = ("approved.json", "approved.py", "test_one.py", "walker.py")
+    assert nearest.made_of("tests/walks/test_one.py") == tuple(f"tests/walks/{name}" for name in beside)
+    others = ("approved.json", "test_other.py")
+    assert nearest.made_of("tests/walks/test_other.py") == tuple(f"tests/walks/{name}" for name in others)
+
+
 def test_the_nearest_tests_come_first_but_for_one_that_takes_much_longer() -> None:
     files = ("a", "b", "c")
     assert cheapest_first(files, {}) == files

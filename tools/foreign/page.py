@@ -65,7 +65,7 @@ def write_page(rows: Sequence[Row]) -> None:
 def _table(rows: Sequence[Row], results: Sequence[Result]) -> str:
     known = {result.name: result for result in results}
     lines = [
-        "| row | source | what it is | what is said, and what must come back | last run |",
+        "| row | source | program | required result | passed in |",
         "|---|---|---|---|---|",
     ]
     for row in rows:
@@ -77,7 +77,7 @@ def _table(rows: Sequence[Row], results: Sequence[Result]) -> str:
 
 def _tried() -> str:
     rows = [f"| {_cell(one.name)} | {_cell(one.tried)} | {_cell(one.error)} |" for one in TRIED]
-    return "\n".join(["| program | what was tried | what came of it |", "|---|---|---|", *rows]) + "\n"
+    return "\n".join(["| program | attempt | result |", "|---|---|---|", *rows]) + "\n"
 
 
 def _source(row: Row) -> str:
@@ -91,12 +91,13 @@ def _ended(result: Result) -> str:
 
 
 def _shown(row: Row, result: Result | None) -> str:
+    """Return how the row ended; what came back of one that passed is in `results.json` alone."""
     if result is None:
         shown = row.tried or "not run"
     else:
-        before = f" (before: {result.before})" if result.before else ""
-        notes = f", {', '.join(result.notes)}" if result.notes else ""
-        shown = f"{_ended(result)}{notes}{before}: {result.text}"
+        has_passed = result.status is RowStatus.PASSED
+        ended = f"{result.seconds:.0f} s" if has_passed else f"{_ended(result)}: {result.text}"
+        shown = f"{ended}{', busy' if result.notes else ''}"
     return f"{shown}. Found: {row.found}" if row.found else shown
 
 

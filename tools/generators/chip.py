@@ -1,7 +1,7 @@
 """Write what C and docs take from declarations in Python: shared structs, and the registers of each peripheral.
 
 From `extension/layout.py`: `source/fabric/layout.h`. From `extension/encodings.py`: `source/interpreter/encodings.h`,
-and the table of instructions in `docs/core.md`. From `REGISTERS` and its neighbours of each peripheral on the
+and `docs/instructions.md`. From `REGISTERS` and its neighbours of each peripheral on the
 chip's page: `source/registers/KIND.h` of each kind of device in C, and `docs/registers.md`.
 A test holds the committed files to what comes out here; a file that is no longer made is removed.
 Usage: python -m tools.generators.chip
@@ -25,9 +25,7 @@ from bluepill_sim.stm32f103 import BASES, PERIPHERALS
 ROOT = Path(__file__).resolve().parents[2]
 SOURCE = Path("bluepill_sim/extension/source")
 HEADERS = SOURCE / "registers"
-PAGE, CORE_PAGE = Path("docs/registers.md"), Path("docs/core.md")
-#: What stands around the table of instructions there.
-_FROM, _TO = "<!-- instructions: made by tools.generators.chip -->", "<!-- end of instructions -->"
+PAGE, INSTRUCTIONS = Path("docs/registers.md"), Path("docs/instructions.md")
 #: Registers alike that are more than these are named by the first alone, in C.
 _MOST_ALIKE = 32
 _WIDTH = 118
@@ -55,10 +53,8 @@ def files() -> dict[Path, str]:
         if peripheral.KIND not in {None, LISTENER} and peripheral not in kinds.setdefault(str(peripheral.KIND), []):
             kinds[str(peripheral.KIND)].append(peripheral)
     taken = frozenset(_fabric_names())
-    if (ROOT / CORE_PAGE).is_file():
-        made[CORE_PAGE] = with_instructions((ROOT / CORE_PAGE).read_text(encoding="utf-8"))
     return made | {HEADERS / f"{kind}.h": registers_header(kind, them, taken) for kind, them in kinds.items()} | {
-        PAGE: page(peripherals())
+        PAGE: page(peripherals()), INSTRUCTIONS: instructions_page(),
     }  # fmt: skip
 
 
@@ -251,16 +247,25 @@ def _extraction(row: Encoding) -> str:
     return text
 
 
-def with_instructions(text: str) -> str:
-    """Return the page of the core with the table of instructions as it is."""
-    before, _, rest = text.partition(_FROM)
-    _, _, after = rest.partition(_TO)
-    table = ["| instruction | bits | cycles |", "| --- | --- | --- |"]
+def instructions_page() -> str:
+    """Return the page of all instructions: syntax, bits and cycles of each encoding."""
+    lines = [
+        "# Instructions of the emulated Cortex-M3",
+        "",
+        "Made by `python -m tools.generators.chip` from `bluepill_sim/extension/encodings.py`, the table by which the",
+        "interpreter decodes and blocks are timed. How they run, and what is chosen: [core.md](core.md). A letter is a",
+        "bit of a field, `-` a bit that is ignored. The first row that fits applies; without one, UsageFault",
+        "(UNDEFINSTR) is raised. LDR into the PC costs 3 more. Costs behind another load, and across lines of the",
+        "flash, are [with the timing](core.md#time).",
+        "",
+        "| instruction | bits | cycles |",
+        "| --- | --- | --- |",
+    ]
     for row in (*NARROW, *WIDE):
         if row.operation != UNDEFINED:
             syntax = re.sub(r"<([^c])>", lambda found: f"R{found[1]}", row.syntax)
-            table.append(f"| {syntax.replace('|', ' ')} | `{_drawn(row)}` | {_cycles(row.kind)} |")
-    return "\n".join([f"{before}{_FROM}", *table, f"{_TO}{after}"]) if _FROM in text else text
+            lines.append(f"| {syntax.replace('|', ' ')} | `{_drawn(row)}` | {_cycles(row.kind)} |")
+    return "\n".join([*lines, ""])
 
 
 def _drawn(row: Encoding) -> str:

@@ -20,6 +20,8 @@ from p2os.pioneer.world import model as world
 from p2os.robots import model_file
 from p2os.toml_record import keys_of
 from p2os.toml_schema import Key
+from robot_bench.campaign import campaign_file
+from robot_bench.direct.differential import robot_file
 from robot_bench.scenario.goals.kinds import every_kind
 from robot_bench.scenario.hands.doing import ACTION_TABLES
 from robot_bench.scenario.hands.timed import TimedHandTable
@@ -28,7 +30,17 @@ from robot_bench.scenario.trigger_script import WhenTable
 from robot_bench.scenario.world_script import ThingTable
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGES = tuple(ROOT / "docs" / name for name in ("worlds.md", "scenarios.md", "pioneer.md", "adapter.md"))
+PAGES = tuple(
+    ROOT / "docs" / name
+    for name in (
+        "worlds.md",
+        "scenarios.md",
+        "pioneer.md",
+        "adapter.md",
+        "campaigns.md",
+        "own-robot.md",
+    )
+)
 BLOCK = re.compile(r"(<!-- (?:ranges|table): (?P<name>[a-z ]+) -->\n)(?P<body>.*?)(<!-- end -->)", re.DOTALL)
 #: Table → key → its range in words.
 Ranges = Mapping[str, Mapping[str, str]]
@@ -88,7 +100,8 @@ def keys_table(tables: Mapping[str, Iterable[Key]]) -> str:
         for key in sorted(keys, key=lambda key: not key.required):
             words = "required" if key.required else _default(key), _values(key), _cell(key.doc)
             named.setdefault(words, []).append(f"`{_header(key)}`")
-        rows += [_row([*([] if is_one else [f"`{table}`"]), ", ".join(one), *words]) for words, one in named.items()]
+        first = [] if is_one else [f"`{table}`" if table.startswith("[") else table]
+        rows += [_row([*first, ", ".join(one), *words]) for words, one in named.items()]
     return "\n".join(rows)
 
 
@@ -128,7 +141,7 @@ def _header(key: Key) -> str:
 
 def _default(key: Key) -> str:
     value = key.default.value if isinstance(key.default, Enum) else key.default
-    if value in (None, "", ()) or key.kind in {"table", "tables"}:
+    if value in (None, "", ()) or key.kind in {"table", "tables", "points"}:
         return ""
     if isinstance(value, (int, float)):
         return str(value).lower() if isinstance(value, bool) else number(value)
@@ -146,8 +159,7 @@ def _values(key: Key) -> str:
 
 
 def _cell(doc: str) -> str:
-    first = doc.strip().partition("\n")[0].removesuffix(".").replace("scenarios.md#", "#")
-    return first.replace("|", "\\|")
+    return doc.strip().partition("\n")[0].removesuffix(".").replace("|", "\\|")
 
 
 def exports() -> str:
@@ -177,6 +189,9 @@ def tables() -> dict[str, str]:
             "`do`", "what is done", {do: (one, one.__doc__ or "") for do, one in ACTION_TABLES.items()}
         ),
         "goals": kinds_table("kind", "met when", {name: (one.table, one.doc) for name, one in every_kind().items()}),
+        "campaign file": keys_table({"": campaign_file.TABLES[""]}),
+        "campaign tables": keys_table({name: keys for name, keys in campaign_file.TABLES.items() if name}),
+        "own robot": keys_table({name or "the file": keys for name, keys in robot_file.TABLES.items()}),
         "robot": lines(robots, "table"),
         "fleet": lines({"": {**of_keys((*fleet_file.TOP, *fleet_file.ROBOT)), **plain(at)}}, ""),
         "sensor errors": _one(sensor_errors.RANGES),

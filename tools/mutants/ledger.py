@@ -28,8 +28,8 @@ LEAST_S = 0.1
 class Ledger:
     """Judgements, a line of JSON each, written when they are made.
 
-    One that a test has noticed holds as long as that file of tests stays as it is; one that tests have not, as long as
-    these are the nearest, and stay as they are.
+    One that a test has noticed holds as long as that file of tests stays as it is, with its helpers and data; one that
+    tests have not, as long as these are the nearest, and stay as they are.
 
     Args:
         file: Where they are kept.

@@ -36,9 +36,10 @@ TESTS_OF_C = {
                                              "tests/bluepill_sim/core/test_core_parts.py", "tests/bluepill_sim/native"),
     "bluepill_sim/extension/source": ("tests/bluepill_sim/fabric", "tests/bluepill_sim/native", "tests/bluepill_sim"),
     "robot_bench/wires": ("tests/robot_bench/wires",),
-    "adapter_fw/core/app": ("tests/adapter_fw/test_shell.py", "tests/adapter_fw/test_esp32.py"),
-    "adapter_fw/core": ("tests/adapter_fw/test_sameness.py", "tests/adapter_fw/test_safety.py",
-                        "tests/adapter_fw/test_program.py", "tests/adapter_fw/test_in_the_bench.py"),
+    "adapter_fw/core/app": ("tests/adapter_fw/test_units.py", "tests/adapter_fw/test_shell.py"),
+    "adapter_fw/core": ("tests/adapter_fw/test_sameness.py", "tests/adapter_fw/test_units.py",
+                        "tests/adapter_fw/test_safety.py", "tests/adapter_fw/test_program.py",
+                        "tests/adapter_fw/test_in_the_bench.py"),
 }  # fmt: skip
 
 Counted = Mapping[str, Mapping[str, frozenset[int]]]
@@ -62,6 +63,16 @@ class Nearest:
     def of(self, path: str, line: int) -> tuple[str, ...]:
         """Return the files of tests nearest to a line, at most `MOST_FILES`."""
         return self._of_python(path, line) if path.endswith(".py") else self._of_c(path)
+
+    def made_of(self, test: str) -> tuple[str, ...]:
+        """Return what a file of tests says by: itself, what of its own folder it imports, and the data beside it."""
+        folder = test.rpartition("/")[0]
+        modules = {f"{name.replace('.', '/')}.py" for name in self._imported_by(test)} & {*self._imports}
+        data = {
+            path.relative_to(self._root).as_posix()
+            for path in (self._root / folder).iterdir() if path.is_file() and path.suffix != ".py"
+        }  # fmt: skip
+        return tuple(sorted({test, *data, *(name for name in modules if name.rpartition("/")[0] == folder)}))
 
     def _of_python(self, path: str, line: int) -> tuple[str, ...]:
         by_name = self._by_name(path)

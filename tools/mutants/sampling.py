@@ -105,8 +105,11 @@ class Court:
 
     def _digest_of(self, name: str) -> str:
         if name not in self._digests:
-            text = (self._folder / "0" / TREE / name).read_bytes()
-            self._digests[name] = hashlib.sha256(text).hexdigest()[:16]
+            hashed = hashlib.sha256()
+            places = {each: self._folder / "0" / TREE / each for each in self._nearest.made_of(name)}
+            for each, place in places.items():
+                hashed.update(f"{each}\0".encode() + (place.read_bytes() if place.exists() else b""))
+            self._digests[name] = hashed.hexdigest()[:16]
         return self._digests[name]
 
 

@@ -27,7 +27,7 @@ const withoutThemes = {
 };
 
 const common = {
-  absWorkingDir: HERE, bundle: true, minify: true, write: false, metafile: true, format: "iife", target: "es2022", charset: "utf8",
+  absWorkingDir: HERE, preserveSymlinks: true, bundle: true, minify: true, write: false, metafile: true, format: "iife", target: "es2022", charset: "utf8",
   legalComments: "none", jsx: "automatic", jsxImportSource: "preact", define: { "process.env.NODE_ENV": '"production"' }, logLevel: "warning", plugins: [withoutThemes],
 };
 

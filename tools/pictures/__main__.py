@@ -27,6 +27,7 @@ from hardware.case.picture import draw
 from hardware.pcb.circuit.design import VARIANTS
 from hardware.pcb.outputs import generated_files, pictures
 from hardware.pcb.spice.decks import decks
+from tools.pictures.tutorials import SHOWN
 
 ROOT = Path(__file__).resolve().parents[2]
 PICTURES = ROOT / "docs" / "pictures"
@@ -71,6 +72,8 @@ def groups() -> Iterator[Group]:
     """Yield all that docs/pictures holds."""
     files = ("robot_bench/scenarios/dodge.toml", f"{WORLDS}/room.toml", "robot_bench/firmware/dodge.elf", PLAN)
     yield Group(names=("demo.gif",), files=files, make=make_demo, text=" ".join(FILM))
+    files = (*files, "tools/pictures/tutorials.py")
+    yield Group(names=tuple(f"tutorials/{name}.png" for name in SHOWN), files=files, make=make_tutorials)
     files = ("bluepill_sim/parts/*.py", "tests/bluepill_sim/firmware/parts.elf", "tools/pictures/parts.py")
     yield Group(names=("parts.png",), files=files, make=make_parts)
     yield Group(names=("silicon.png",), files=("tools/pictures/wiring.py",), make=make_wiring)
@@ -101,6 +104,13 @@ def make_demo() -> None:
             raise SystemExit("pictures: the demonstration failed")
         if run(["render", str(target), "-o", str(PICTURES / "demo.gif"), *FILM]):
             raise SystemExit("pictures: the demonstration was not filmed (hint: apt-get install chromium)")
+
+
+def make_tutorials() -> None:
+    """Draw the pages that the tutorials show."""
+    from tools.pictures.tutorials import draw as draw_tutorials
+
+    draw_tutorials(PICTURES / "tutorials")
 
 
 def make_parts() -> None:

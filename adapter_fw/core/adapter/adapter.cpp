@@ -49,8 +49,7 @@ Adapter::Adapter(const Settings& settings, const RobotNumbers& robot, const Wire
       left_walk_(settings.encoder_dwell_ns),
       right_walk_(settings.encoder_dwell_ns),
       now_(now),
-      next_sample_(now),
-      deadline_(now) {
+      next_sample_(now) {
   client_.set_listener(this);
   // Of a wheel that nobody knows of the code that its wires show already: a jump would be counted as travel.
   const std::int64_t steps = std::int64_t{1} << wires_.encoder_width;
@@ -101,7 +100,6 @@ void Adapter::set_master(Master master, Nanos now) {
   }
   if (has_session()) {
     halt(now);
-    agenda_.is_closed_on_request = false;
   }
   master_ = master;
   pad_.lose();

@@ -124,6 +124,7 @@ class Adapter final : private p2os::ClientListener {
   void set_reason(const char* reason) { reason_ = reason; }
   std::int32_t motor(int number) const;
   Speeds speeds() const { return pacer_.sent(); }
+  Wheels travel_nm() const { return encoders_.travel_nm(); }
   Wheels counts() const { return encoders_.counts(); }
   Wheels counts_shown() const { return {left_walk_.shown(), right_walk_.shown()}; }
   std::uint32_t sips() const { return agenda_.sips; }
@@ -202,7 +203,7 @@ class Adapter final : private p2os::ClientListener {
   std::size_t baud_ = 0;
   Nanos now_;
   Nanos next_sample_;
-  Nanos deadline_;
+  Nanos deadline_{};
   Agenda agenda_;
 };
 

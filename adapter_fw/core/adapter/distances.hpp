@@ -31,8 +31,8 @@ class Distances {
 
  private:
   struct Reading {
-    std::int64_t range_um = 0;
-    Nanos at = 0;
+    std::int64_t range_um{};
+    Nanos at{};
     bool is_known = false;
   };
 

@@ -6,7 +6,6 @@ namespace adapter {
 
 void PlausibilityCheck::begin(Nanos now) {
   command_ = measured_ = {};
-  least_error_ = 0;
   passed_at_ = now;
 }
 

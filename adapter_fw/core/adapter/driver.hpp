@@ -33,8 +33,6 @@ class PlausibilityCheck {
   // Returns when the motion becomes implausible unless a SIP passes before.
   Nanos ends_at() const { return passed_at_ + timeout_ns_; }
 
-  Wheels command() const { return command_; }
-  Wheels measured() const { return measured_; }
 
  private:
   std::int64_t error() const;
@@ -44,8 +42,9 @@ class PlausibilityCheck {
   std::int64_t progress_mm_s_;
   Wheels command_;
   Wheels measured_;
-  std::int64_t least_error_ = 0;
-  Nanos passed_at_ = 0;
+  //: Of the SIPs since the last new command. `begin` leaves it: the SIP that begins to drive is taken at once.
+  std::int64_t least_error_{};
+  Nanos passed_at_{};
 };
 
 //: The newest speeds, and when a VEL+RVEL pair goes out: on a change, not too near to the last, and again when old.
@@ -71,7 +70,7 @@ class CommandPacer {
   Nanos refresh_ns_;
   Speeds wanted_;
   Speeds sent_;
-  Nanos sent_at_ = 0;
+  Nanos sent_at_{};
   bool has_sent_ = false;
 };
 

@@ -28,7 +28,7 @@ class Unwrapper {
 
  private:
   std::int32_t modulus_;
-  std::int32_t last_ = 0;
+  std::int32_t last_{};
   bool has_last_ = false;
 };
 
@@ -54,7 +54,6 @@ class Encoders {
   // Returns the encoder steps of both wheels, by floor, unwrapped.
   Wheels counts() const;
 
-  std::int32_t width() const { return width_; }
   std::uint32_t jumps() const { return jumps_; }
   void forget_jumps() { jumps_ = 0; }
 
@@ -67,7 +66,7 @@ class Encoders {
   Unwrapper x_;
   Unwrapper y_;
   Unwrapper turn_;
-  std::int32_t raw_heading_ = 0;
+  std::int32_t raw_heading_{};
   bool has_heading_ = false;
   std::int64_t heading_ = 0;
   std::int64_t forward_ = 0;

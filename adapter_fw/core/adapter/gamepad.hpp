@@ -33,7 +33,6 @@ class Gamepad {
 
   // Forgets the connect request: the session that it asked for has ended.
   void forget_request() { wants_robot_ = false; }
-  void reset() { *this = Gamepad(trigger_dead_, stick_dead_, loss_ns_); }
 
   bool wants_robot() const { return wants_robot_; }
 
@@ -48,13 +47,10 @@ class Gamepad {
   std::int32_t turn() const { return turn_; }
 
  private:
-  Gamepad(std::int32_t trigger_dead, std::int32_t stick_dead, Nanos loss_ns)
-      : trigger_dead_(trigger_dead), stick_dead_(stick_dead), loss_ns_(loss_ns) {}
-
   std::int32_t trigger_dead_;
   std::int32_t stick_dead_;
   Nanos loss_ns_;
-  Nanos reported_at_ = 0;
+  Nanos reported_at_{};
   std::int32_t forward_ = 0;
   std::int32_t turn_ = 0;
   bool has_report_ = false;

@@ -24,7 +24,6 @@ bool Majority::take(std::uint32_t word) {
 
 void Majority::reset() {
   window_.fill(0);
-  next_ = 0;
   word_ = 0;
 }
 
@@ -89,7 +88,6 @@ bool Median::take(std::int32_t sample) {
 
 void Median::reset() {
   window_.fill(0);
-  next_ = 0;
   value_ = 0;
 }
 
@@ -109,10 +107,7 @@ bool Debounce::take(bool raw, Nanos now) {
   return true;
 }
 
-void Debounce::reset() {
-  level_ = raw_ = false;
-  since_ = 0;
-}
+void Debounce::reset() { level_ = raw_ = false; }
 
 std::int32_t motor_value(std::uint32_t code, std::int32_t width, BitOrder order) {
   std::uint32_t bits = code;

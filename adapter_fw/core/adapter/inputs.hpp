@@ -51,9 +51,9 @@ class DutyMeter {
   void expire(Nanos at);
 
   Nanos timeout_ns_;
-  Nanos edge_at_ = 0;
-  std::uint32_t rose_ = 0;
-  std::uint32_t fell_ = 0;
+  Nanos edge_at_{};
+  std::uint32_t rose_{};
+  std::uint32_t fell_{};
   std::int32_t duty_ = 0;
   bool level_ = false;
   bool has_edge_ = false;
@@ -92,7 +92,7 @@ class Debounce {
  private:
   Nanos high_after_ns_;
   Nanos low_after_ns_;
-  Nanos since_ = 0;
+  Nanos since_{};
   bool level_ = false;
   bool raw_ = false;
 };

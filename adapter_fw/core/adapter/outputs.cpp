@@ -6,7 +6,8 @@ namespace adapter {
 
 namespace {
 
-constexpr std::uint32_t bits(std::int32_t count) { return count >= 32 ? ~0U : (1U << count) - 1; }
+//: `count` is below 32.
+constexpr std::uint32_t bits(std::int32_t count) { return (1U << count) - 1; }
 
 }  // namespace
 

@@ -36,7 +36,7 @@ class CodeWalk {
  private:
   Nanos dwell_ns_;
   std::int64_t shown_ = 0;
-  Nanos stepped_at_ = 0;
+  Nanos stepped_at_{};
   bool has_stepped_ = false;
 };
 

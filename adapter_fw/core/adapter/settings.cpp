@@ -59,7 +59,7 @@ const char* fault_of(const Settings& settings, const WireNumbers& wires) {
   if (!leave_time(settings)) {
     return "a time that comes round is too short: the least is 10 ms, 1 ms between pairs, 0.1 ms between samples";
   }
-  if (settings.sample_count < 1 || settings.sample_count > MAX_SAMPLE_COUNT || settings.sample_count % 2 == 0) {
+  if (settings.sample_count > MAX_SAMPLE_COUNT || settings.sample_count % 2 == 0) {
     return "sample_count must be odd, 1 to 31";
   }
   if (settings.refresh_ns < settings.pair_spacing_ns) {
@@ -73,8 +73,7 @@ const char* fault_of(const Settings& settings, const WireNumbers& wires) {
   if (settings.pad_velocity_mm_s > MAX_SPEED_MM_S || settings.pad_rotation_mrad_s > MAX_SPEED_MM_S) {
     return "a speed of the pad is larger than any robot's";
   }
-  if (settings.pad_trigger_dead < 0 || settings.pad_trigger_dead >= TRIGGER_FULL ||
-      settings.pad_stick_dead < 0 || settings.pad_stick_dead >= STICK_FULL) {
+  if (settings.pad_trigger_dead >= TRIGGER_FULL || settings.pad_stick_dead >= STICK_FULL) {
     return "a dead zone of the pad leaves nothing";
   }
   if (settings.bauds[0] <= 0) {
@@ -91,9 +90,6 @@ const char* fault_of(const WireNumbers& wires) {
     if (width < 1 || width > MAX_WIDTH) {
       return "a value has 1 to 8 wires";
     }
-  }
-  if (wires.distances + 2 * wires.encoder_width > 32) {
-    return "more than 32 output wires";
   }
   return nullptr;
 }

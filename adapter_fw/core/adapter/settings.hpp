@@ -21,35 +21,36 @@ enum class Master : std::uint8_t { BLUEPILL, PAD };
 constexpr std::size_t MAX_DISTANCES = 16;
 constexpr std::int32_t MAX_WIDTH = 8;
 constexpr std::int32_t MAX_SAMPLE_COUNT = 31;
+static_assert(MAX_DISTANCES + 2 * MAX_WIDTH <= 32, "the outputs are a word");
 
-//: A robot as the adapter sees it; from p2os/robots.
+//: A robot as the adapter sees it; generated/robots.hpp has them.
 struct RobotNumbers {
-  std::int64_t distance_nm_per_count = 840'000;
-  std::int64_t angle_counts_per_turn = 4'096;
-  std::int64_t velocity_um_s_per_count = 1'000;
-  std::int64_t range_um_per_count = 268;
-  std::int64_t track_mm = 357;
-  std::int64_t wheel_diameter_um = 165'000;
+  std::int64_t distance_nm_per_count;
+  std::int64_t angle_counts_per_turn;
+  std::int64_t velocity_um_s_per_count;
+  std::int64_t range_um_per_count;
+  std::int64_t track_mm;
+  std::int64_t wheel_diameter_um;
   //: Ceiling of the model: no step of the odometry is longer than this makes.
-  std::int64_t ceiling_mm_s = 2'200;
+  std::int64_t ceiling_mm_s;
   //: The lower of the model's ceiling and its default limit.
-  std::int64_t max_velocity_mm_s = 750;
-  std::int64_t max_rotation_deg_s = 100;
+  std::int64_t max_velocity_mm_s;
+  std::int64_t max_rotation_deg_s;
   //: Half of the sonar's range: the threshold where none is set.
-  std::int64_t half_sonar_range_um = 2'500'000;
+  std::int64_t half_sonar_range_um;
 };
 
-//: The wires' widths and levels; from adapter_sim/pinout.toml.
+//: The wires' widths and levels; each board's generated/…/pins.hpp has them.
 struct WireNumbers {
-  std::int32_t distances = 8;
-  std::int32_t motor1_width = 3;
-  std::int32_t motor2_width = 3;
-  std::int32_t encoder_width = 3;
+  std::int32_t distances;
+  std::int32_t motor1_width;
+  std::int32_t motor2_width;
+  std::int32_t encoder_width;
   //: Distance wires that are driven to a level when nothing is known, and that level (bit 0 is DD1).
-  std::uint32_t safe_mask = 0xFF;
-  std::uint32_t safe_levels = 0xFF;
+  std::uint32_t safe_mask;
+  std::uint32_t safe_levels;
   //: What the encoders' wires show while nobody drives them, the left one's code in the low bits.
-  std::uint32_t released_codes = 0x20;
+  std::uint32_t released_codes;
 };
 
 struct Settings {

@@ -17,15 +17,12 @@ constexpr std::int32_t ENABLES = 2;
 
 void Adapter::clear() {
   agenda_ = {};
-  next_sample_ = now_;
   majority_.reset();
   left_duty_.reset();
   right_duty_.reset();
   connect_.reset();
   pad_.lose();
-  plausibility_.begin(now_);
   pacer_.begin({});
-  distances_.forget();
   // Absolute: where the wheels stand outlives a reset.
   encoders_.begin(encoders_.travel_nm());
   encoders_.forget_jumps();
@@ -37,7 +34,6 @@ void Adapter::clear() {
 
 // Follows the reset wire, whose level does not fit the state.
 void Adapter::follow_reset(Nanos now) {
-  now_ = now;
   if (state_ == State::RESET) {
     agenda_.boot_at = now + settings_.boot_ns;
     enter(State::BOOTING, now, What::BOOTING, "rst is low");
@@ -65,9 +61,6 @@ void Adapter::begin_session(Nanos now, const char* why) {
 }
 
 void Adapter::session_opened(const p2os::Identity& robot, Nanos now) {
-  if (state_ != State::CONNECTING) {
-    return;
-  }
   identity_ = robot;
   client_.send(CommandFrame(CommandNumber::SETO), now);
   client_.send(CommandFrame(CommandNumber::SONAR, 1), now);
@@ -91,15 +84,12 @@ void Adapter::session_ended(p2os::EndReason reason, Nanos now) {
     agenda_.retry_at = now + settings_.retry_ns;
     next_baud();
     notify(now, What::NO_CONNECTION, p2os::text(reason), static_cast<std::int32_t>(settings_.retry_ns / NS_PER_MS));
-  } else if (is_open()) {
+  } else {
     lose(What::LOST, p2os::text(reason), now);
   }
 }
 
 void Adapter::take_sip(const p2os::Sip& sip, Nanos now) {
-  if (!is_open()) {
-    return;
-  }
   ++agenda_.sips;
   // From when its bytes came: one that was found late, behind a false header, is as old as they are.
   agenda_.sip_deadline = p2os::later(now, agenda_.received_at + settings_.liveness_ns);
@@ -141,7 +131,6 @@ void Adapter::drive(Nanos now) {
 
 void Adapter::lose(What what, const char* why, Nanos now) {
   halt(now);
-  agenda_.is_closed_on_request = false;
   pad_.forget_request();
   enter(State::LOST, now, what, why);
 }
@@ -167,9 +156,9 @@ void Adapter::end_request(const char* why, Nanos now) {
 // Stops and closes the robot, and shows what is known: nothing.
 void Adapter::halt(Nanos now) {
   client_.abandon();
+  agenda_.is_closed_on_request = false;
   agenda_.stops_left = settings_.stop_repeats;
   agenda_.stop_at = now + settings_.stop_repeat_ns;
-  distances_.forget();
   pacer_.begin({});
   outputs_.show_safe(now);
 }

@@ -41,7 +41,7 @@ void BoardTest::drive(std::uint32_t mask, std::uint32_t levels, p2os::Nanos now)
 }
 
 void BoardTest::release(p2os::Nanos now) {
-  driven_ = levels_ = 0;
+  driven_ = 0;
   if (!is_on_) {
     hardware_.out.release(now);
   }

@@ -71,9 +71,9 @@ class BoardTest final : public hal::PinsIn, public hal::PinsOut, public hal::Uar
   bool is_on_ = false;
   //: What the adapter wants.
   std::uint32_t driven_ = 0;
-  std::uint32_t levels_ = 0;
+  std::uint32_t levels_{};
   std::array<std::uint8_t, KEPT_BYTES> back_{};
-  std::size_t came_back_ = 0;
+  std::size_t came_back_{};
   std::uint32_t reports_ = 0;
   adapter::PadReport report_{};
 };

@@ -29,7 +29,7 @@ std::uint32_t check_of(const RetainedWheels& memory) {
 }  // namespace
 
 void CodeKeeper::restore(adapter::Adapter& part) {
-  std::int64_t both = 0;
+  std::int64_t both{};
   adapter::Wheels kept{-1, -1};
   if (memory_.check == check_of(memory_) && is_phase(memory_.left_um) && is_phase(memory_.right_um)) {
     kept = {memory_.left_um, memory_.right_um};

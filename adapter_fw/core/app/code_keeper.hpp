@@ -43,7 +43,7 @@ class CodeKeeper {
   RetainedWheels& memory_;
   Store& store_;
   adapter::Wheels last_;
-  p2os::Nanos since_ = 0;
+  p2os::Nanos since_{};
   bool is_stored_ = true;
 };
 

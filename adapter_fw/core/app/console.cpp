@@ -24,7 +24,7 @@ void write_bits(Writer& writer, const char* name, std::uint32_t levels, std::int
 adapter::Settings stored_settings(Store& store, const adapter::WireNumbers& wires, const char*& fault) {
   adapter::Settings settings;
   for (std::int32_t place = 0; place < adapter::setting_count(); ++place) {
-    std::int64_t value = 0;
+    std::int64_t value{};
     if (store.load(adapter::setting(place).name, value)) {
       adapter::setting(place).set(settings, value);
     }
@@ -164,7 +164,7 @@ void Console::test(bool is_on, p2os::Nanos now) {
 }
 
 void Console::wires(const char* mask, const char* levels, p2os::Nanos now) {
-  std::uint32_t driven = 0, wanted = 0;
+  std::uint32_t driven{}, wanted{};
   if (mask != nullptr) {
     if (!is_in_test()) {
       return;
@@ -191,7 +191,7 @@ void Console::link(const char* hex) {
     std::size_t size = 0;
     for (; hex[0] != '\0' && hex[1] != '\0' && size < bytes.size(); hex += 2, ++size) {
       const char pair[] = {hex[0], hex[1], '\0'};
-      std::uint32_t value = 0;
+      std::uint32_t value{};
       if (!read_hex(pair, value)) {
         break;
       }
@@ -264,7 +264,7 @@ void Console::get(const char* name) {
 // A value that leaves the settings with a fault is not stored: the next start must find sound ones.
 void Console::set(const char* name, const char* value) {
   const std::int32_t place = adapter::find_setting(name);
-  std::int64_t wanted = 0;
+  std::int64_t wanted{};
   if (place < 0) {
     parts_.writer.write("error: no such setting; get lists them\n");
     return;

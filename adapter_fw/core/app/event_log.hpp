@@ -27,11 +27,11 @@ class EventLog final : public adapter::Observer {
 
  private:
   struct Entry {
-    p2os::Nanos at = 0;
-    adapter::What what = adapter::What::RESET;
-    const char* detail = "";
-    std::int32_t first = 0;
-    std::int32_t second = 0;
+    p2os::Nanos at;
+    adapter::What what;
+    const char* detail;
+    std::int32_t first;
+    std::int32_t second;
   };
 
   static void write_entry(const Entry& entry, Writer& writer);

@@ -29,7 +29,7 @@ class ModeButton {
 
  private:
   bool is_armed_ = false;
-  p2os::Nanos since_ = 0;
+  p2os::Nanos since_{};
 };
 
 }  // namespace app

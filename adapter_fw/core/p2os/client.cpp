@@ -64,7 +64,7 @@ void Client::abandon() {
 
 void Client::drop() {
   enter(ClientState::CLOSED, NEVER);
-  first_ = count_ = 0;
+  count_ = 0;
 }
 
 void Client::send(const CommandFrame& frame, Nanos now) {

@@ -146,8 +146,8 @@ class Client final : private FrameSink {
   ClientState state_ = ClientState::CLOSED;
   //: When the present state runs out.
   Nanos due_ = NEVER;
-  Nanos last_sent_ns_ = 0;
-  std::int32_t attempts_ = 0;
+  Nanos last_sent_ns_{};
+  std::int32_t attempts_{};
   //: Whether a packet has come since OPEN.
   bool has_received_ = false;
   Identity identity_;

@@ -69,7 +69,7 @@ class Decoder {
   std::size_t size_ = 0;
   //: Bytes at the head that belong to a frame already rejected.
   std::size_t rescanned_ = 0;
-  Nanos last_byte_ns_ = 0;
+  Nanos last_byte_ns_{};
   DecoderStats stats_;
 };
 

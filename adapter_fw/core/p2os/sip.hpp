@@ -22,15 +22,15 @@ struct SonarReading {
 };
 
 struct Sip {
-  std::uint16_t raw_x = 0;       // 15-bit counts of DistConvFactor
-  std::uint16_t raw_y = 0;
-  std::int16_t raw_heading = 0;  // counts, 4096 to the turn
-  std::int16_t raw_left_velocity = 0;
-  std::int16_t raw_right_velocity = 0;
-  std::uint8_t raw_battery = 0;  // 0.1 V
-  bool stall_left = false;
-  bool stall_right = false;
-  std::uint8_t sonar_count = 0;
+  std::uint16_t raw_x{};       // 15-bit counts of DistConvFactor
+  std::uint16_t raw_y{};
+  std::int16_t raw_heading{};  // counts, 4096 to the turn
+  std::int16_t raw_left_velocity{};
+  std::int16_t raw_right_velocity{};
+  std::uint8_t raw_battery{};  // 0.1 V
+  bool stall_left{};
+  bool stall_right{};
+  std::uint8_t sonar_count{};
 
   // Returns one of the readings; they stay in the frame's bytes.
   SonarReading sonar(std::uint8_t place) const;

@@ -10,9 +10,9 @@ from simbase.files import write_text
 
 HELP = """Write a page that runs a firmware in a browser.
 
-One HTML file with the emulator in it, as WebAssembly: it opens from the disk, without a server or a network. The chip
-alone: console, pins and speed; what this page does not have is named there. Without FIRMWARE, a file is chosen in the
-page.
+The HTML file contains the emulator as WebAssembly and opens from disk, without
+a server or network. It has the chip alone: console, pins and speed; the page
+names what it does not model. Without FIRMWARE, the page asks for a file.
 
 \b
 Examples:

@@ -20,16 +20,18 @@ from bluepill_sim.program.image import Image
 from bluepill_sim.program.line_table import read_lines
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
-HELP = """Run a firmware on two cores, and name the first difference.
+HELP = """Run a firmware on two cores and show the first difference.
 
-own, python: beside the default core (Unicorn, native), from block boundary to block boundary: registers, memories,
-peripherals, cycles. exact: each instruction judged by Unicorn, which gets each exception where this core took it, and
-the state behind what reaches for a peripheral; some ten thousand instructions a second.
-Exit code 1: they differ.
+own and python are compared with the default core (Unicorn, native) at each
+block: registers, memories, peripherals, cycles. With exact, Unicorn judges each
+instruction, taking over the exact core's exceptions and peripheral accesses, at
+some ten thousand instructions a second.
+
+Exit code: 0 no difference, 1 a difference.
 
 \b
 Examples:
-  {program} compare-cores mine.elf                       a second on the interpreter of our own
+  {program} compare-cores mine.elf                       a second on the project's interpreter
   {program} compare-cores mine.elf --drive PA0=1@3ms     with an input
   {program} compare-cores mine.elf --core exact --for 5ms
 """

@@ -10,15 +10,17 @@ from bluepill_sim.analysis.silicon.comparison import ComparedNumber, NumberVerdi
 from bluepill_sim.analysis.silicon.log import KINDS, MOST_BYTES, read_log
 from simbase.files import read_bytes
 
-HELP = """Lay what a real STM32F103C8 says of itself beside the model.
+HELP = """Compare a real STM32F103C8's log with the model.
 
-LOG is what the silicon kit prints over USART1 (115200 8N1 on PA9): flash bluepill_sim/analysis/silicon/kit.elf, press
-reset, record it. It erases the last page of the flash. The model runs the same program.
-Exit code 1: something differs by more than is allowed. docs/silicon.md tells what is counted, and why what is allowed.
+LOG is the output of the silicon kit on USART1 (115200 8N1, PA9): flash
+bluepill_sim/analysis/silicon/kit.elf, press reset, record. The kit erases the
+last page of the flash. The model runs the same program.
+
+Exit code: 0 all within the allowed limits (docs/silicon.md), 1 something is not.
 
 \b
 Examples:
-  {program} compare-silicon board.log          what differs, and a count of what does not
+  {program} compare-silicon board.log          differences, and a count of equal values
   {program} compare-silicon board.log --all    every number
 """
 

@@ -16,20 +16,23 @@ from bluepill_sim.native.interrupt_latency import MOST_CYCLES
 from bluepill_sim.program.image import load_image
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
-HELP = """Say whether a firmware's output hangs on its interrupts' latency.
+HELP = """Search a firmware for races with its interrupts.
 
-Runs it as it is, and again with each interrupt a drawn number of cycles late, 0 to 12. Where pins or characters then
-come in other numbers, values or another order, it *depends*: both orders of the interrupt and an instruction are shown,
-with what is put out in each. Which of them silicon takes is not known here, so this is no fault; but a program without
-races has none. Times alone are not compared. Runs on the core that takes interrupts at the instruction
-(P2OS_CORE=exact). Exit code 1: it depends. docs/debugging.md tells what counts.
+It runs the firmware unchanged, then with each interrupt delayed by a random 0 to
+12 cycles. If pins or characters differ in number, value or order, the program
+*depends*: both orders of interrupt and instruction are shown, with their output.
+Times alone are not compared. The order silicon takes is not known, so this is no
+fault; a program without races does not depend. The core is P2OS_CORE=exact. See
+docs/debugging.md.
+
+Exit code: 0 it does not depend, 1 it does.
 
 \b
 Examples:
   {program} races mine.elf                            twenty runs of one second
-  {program} races mine.elf --for 5s --runs 100        more of both
-  {program} races mine.elf --drive PA6=1@500ms        with something done to it
-  {program} races grbl.elf --send '$X\\nG1X1F99\\n@1s'   with what it is told over USART1
+  {program} races mine.elf --for 5s --runs 100        more and longer runs
+  {program} races mine.elf --drive PA6=1@500ms        with an input
+  {program} races grbl.elf --send '$X\\nG1X1F99\\n@1s'   with input on USART1
 """
 #: chosen: as many as can be awaited for a program that sleeps most of the time.
 _RUNS = 20

@@ -9,15 +9,15 @@ from hardware.pcb.spice.deck import Deck
 
 _HEAD = """# The board, simulated
 
-Circuits of the [adapter board](board.md) in ngspice,
-with our own behavioural models: `hardware/pcb/spice/deck.py` says
-where each figure comes from. They show what the circuit's values make of the data sheets' figures. No board has been
-built: nothing here is a measurement. Each figure has limits,
-and `tests/hardware/test_pcb_spice.py` and `make board-check`
-fail when one leaves them. Circuits are built from the netlist:
-parts, values, polarity and nets are the design's, and only what is outside the board is written by hand.
+Circuits of the [adapter board](board.md) in ngspice, with our own behavioural models, built from the netlist.
+No board exists: these are consequences of data sheets, not measurements.
 
-`python -m hardware.pcb simulate` runs all of them, renews the plots and writes this page.
+```sh
+python -m hardware.pcb simulate     # run all, renew the plots, write this page
+```
+
+`hardware/pcb/spice/deck.py` gives the source of each figure. `tests/hardware/test_pcb_spice.py` and
+`make board-check` fail when a figure leaves its limits. Only what is outside the board is written by hand.
 """
 
 
@@ -45,6 +45,6 @@ def _section(deck: Deck, figures: Mapping[str, float]) -> str:
         rows.append(f"| {limit.meaning} | {value} {limit.unit} | {low} to {high} |")
     table = "\n".join(["| figure | simulated | limits |", "| --- | --- | --- |", *rows])
     return (
-        f"\n## {deck.title}\n![{deck.title}](pictures/board/sim-{deck.name}.png)\n\n{table}\n\n"
-        f"**What the model cannot say.** {deck.cannot_say}\n"
+        f"\n## {deck.title}\n\n![Plot of {deck.name}](pictures/board/sim-{deck.name}.png)\n\n{table}\n\n"
+        f"**Limits.** {deck.cannot_say}\n"
     )

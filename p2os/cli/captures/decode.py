@@ -23,11 +23,11 @@ from p2os.cli.groups import CAPTURES
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos
 
-HELP = """Show what stands in P2OS bytes.
+HELP = """Decode P2OS packets from a file, hex text or stdin.
 
-SOURCE is a file, the folder of a run, hex text, or - for stdin. Files may be
-recordings of p2os, JSON lines of others, pcap or pcapng, hex text (also of xxd
-and hexdump -C), or raw bytes.
+SOURCE is a file, a run folder, hex text, or - for stdin. Files may be p2os
+recordings, JSON lines of other programs, pcap or pcapng, hex text (also xxd and
+hexdump -C), or raw bytes.
 
 \b
 Examples:

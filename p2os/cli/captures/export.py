@@ -20,11 +20,11 @@ from p2os.cli.kept_files import FORCE_HELP, refuse_to_overwrite
 from simbase.errors import FileError, UsageError
 from simbase.files import open_to_write_text, writing
 
-HELP = """Write a capture as CSV, Parquet, Arrow or MCAP.
+HELP = """Export a capture as CSV, Parquet, Arrow or MCAP.
 
-The file's ending decides. Tables hold the robot's SIPs, one a line, with positions in metres that go on
-where the robot's counters wrap; --only chooses other packets. MCAP holds every
-packet, one channel a name, and opens in Foxglove.
+The file's ending selects the format. Tables have one SIP per line, with
+positions in metres that continue where counters wrap; --only selects other
+packets. MCAP has one channel per packet name and opens in Foxglove.
 
 \b
 Examples:

@@ -25,7 +25,7 @@ from simbase.command_line.signals import postponed
 from simbase.timing import NS_PER_S, Nanos
 from simbase.units import TIME
 
-HELP = """Record all that a robot and this program send, motors off.
+HELP = """Record a robot's packets and this program's, motors off.
 
 \b
 Examples:

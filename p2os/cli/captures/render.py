@@ -6,6 +6,7 @@ import shutil
 import subprocess
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated, cast
@@ -23,10 +24,10 @@ from simbase.files import writing
 from simbase.timing import NS_PER_S, Nanos
 from simbase.units import FACTOR, TIME
 
-HELP = """Draw a run, or a capture, as a picture or a film.
+HELP = """Draw a run or capture as a picture or film.
 
-The page of `p2os view` draws it, in a Chromium or Chrome without a window. What comes
-out is what the file's ending says: png, svg (the plan), gif (needs Pillow) or mp4
+The page of `p2os view` draws it in a Chromium or Chrome without a window. The
+file's ending selects the format: png, svg (the plan), gif (needs Pillow) or mp4
 (needs ffmpeg).
 
 \b
@@ -161,13 +162,42 @@ def _write_gif(path: Path, pictures: Iterator[bytes], pace_hz: float) -> None:
 
 
 def _write_mp4(path: Path, pictures: Iterator[bytes], pace_hz: float) -> None:
-    command = ["ffmpeg", "-y", "-loglevel", "error", "-f", "image2pipe", "-framerate", f"{pace_hz:g}", "-i", "-",
+    command = [_ffmpeg(), "-y", "-loglevel", "error", "-f", "image2pipe", "-framerate", f"{pace_hz:g}", "-i", "-",
                "-pix_fmt", "yuv420p", "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", str(path)]  # fmt: skip
-    done = subprocess.run(  # noqa: S603 - ffmpeg with our own words
-        command, input=b"".join(pictures), capture_output=True, check=False
-    )
-    if done.returncode:
-        raise UsageError(f"ffmpeg: {done.stderr.decode('utf-8', 'replace').strip()[-300:]}")
+    with subprocess.Popen(  # noqa: S603 - ffmpeg with our own words
+        command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
+    ) as running:
+        assert running.stdin is not None  # noqa: S101 - it is a pipe
+        assert running.stderr is not None  # noqa: S101 - likewise
+        try:
+            with contextlib.suppress(BrokenPipeError):  # it has ended, and says why
+                for picture in pictures:
+                    running.stdin.write(picture)
+                running.stdin.close()
+        except BaseException:
+            running.kill()
+            with contextlib.suppress(BrokenPipeError):  # what waits in our buffer goes nowhere
+                running.stdin.close()
+            raise
+        said = running.stderr.read().decode("utf-8", "replace").strip()
+    if running.returncode:
+        raise UsageError(f"ffmpeg: {said[-300:]}")
+
+
+def _ffmpeg() -> str:
+    """Return the program ffmpeg: this machine's, or that of the package imageio-ffmpeg.
+
+    Raises:
+        MissingDependencyError: Neither is here.
+    """
+    found = shutil.which("ffmpeg")
+    if found is None:
+        with contextlib.suppress(ImportError, RuntimeError):  # RuntimeError: the package brings none for this machine
+            found = str(import_module("imageio_ffmpeg").get_ffmpeg_exe())
+    if found is None:
+        hint = "apt-get install ffmpeg, or pip install imageio-ffmpeg; or a .gif"
+        raise MissingDependencyError("an MP4 needs ffmpeg, which is not here", hint=hint)
+    return found
 
 
 _Write = Callable[[Path, Iterator[bytes], float], None]
@@ -189,8 +219,8 @@ def _writer_of(path: Path) -> _Write:
 
             return _write_gif
         raise MissingDependencyError("a GIF needs Pillow, which is not here", extra="view")
-    if path.suffix == ".mp4" and shutil.which("ffmpeg") is None:
-        raise MissingDependencyError("an MP4 needs ffmpeg, which is not here", hint="apt-get install ffmpeg, or a .gif")
+    if path.suffix == ".mp4":
+        _ffmpeg()
     return _WRITERS[path.suffix]
 
 

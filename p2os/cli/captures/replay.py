@@ -29,17 +29,17 @@ from simbase.units import FACTOR
 
 HELP = """Play a recorded conversation again.
 
-As the robot, it waits for a client at URL and sends it what the recorded robot
+As the robot, it waits for a client at URL and sends what the recorded robot
 sent. As the client, it connects to a robot at URL and sends what the recorded
-client sent: the robot MOVES as it did. The handshake keeps in step with the far
-side; all else comes at its recorded time. At the end, on Ctrl-C and on any error
-a robot whose session is still open is sent STOP, VEL 0 and CLOSE.
+client sent: the robot MOVES as it did. The handshake follows the other side;
+the rest keeps its recorded times. At the end, on Ctrl-C and on errors, a robot
+with an open session gets STOP, VEL 0 and CLOSE.
 
 \b
 Examples:
-  p2os replay talk.jsonl tcp:127.0.0.1:8101                 be the recorded robot
+  p2os replay talk.jsonl tcp:127.0.0.1:8101                 act as the recorded robot
   p2os replay talk.jsonl pty:/tmp/robot --speed 2           twice as fast
-  p2os replay talk.pcap tcp:127.0.0.1:8101 --as client      drive a robot as then
+  p2os replay talk.pcap tcp:127.0.0.1:8101 --as client      drive a robot as recorded
   p2os replay talk.jsonl serial:/dev/ttyUSB0 --as client --yes
 """
 #: chosen: three times what clients wait for the answer to a SYNC.

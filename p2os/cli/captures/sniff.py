@@ -41,13 +41,13 @@ from simbase.units import TIME
 
 DEFAULT_LISTEN = "tcp:127.0.0.1:8102"
 
-HELP = f"""Show or record what a client and a robot send each other.
+HELP = f"""Show or record the traffic between a client and a robot.
 
-It stands between the two and passes everything on. Let the client
-connect to the URL of --listen instead of the robot's. When the
-client goes, Ctrl-C ends it or a file cannot be written while a session is open, the
-robot is sent STOP, VEL 0 and CLOSE. What is printed never holds the two up: a
-reader that does not read misses lines, and gets their number.
+It relays all bytes between the two. Let the client connect to the URL of
+--listen instead of the robot's. If the client leaves, Ctrl-C ends the program or
+a file cannot be written while a session is open, the robot gets STOP, VEL 0 and
+CLOSE. Output never delays the relay: a slow reader loses lines and gets their
+number.
 
 \b
 Examples:

@@ -20,13 +20,13 @@ from simbase.units import PORT, SPEED, TURN_RATE
 #: Speeds of a key that is held, as of `p2os teleop`: m/s and deg/s.
 MOST_MPS, MOST_DPS = 0.3, 45.0
 
-HELP = """Look at a run, capture, scenario or robot in the browser.
+HELP = """View a run, capture, scenario or robot in the browser.
 
-TARGET is a run folder, a capture (pcap, a recording, hex), a scenario, which is
-then run at the pace of the clock, or the URL of a robot, which is watched and not
-moved; with --drive the page drives it: hold a key, the stick or a pad; it stops as
-soon as nothing is held, the page is left, or nothing is heard of it. The page is served on this machine alone, and
-its link holds a token: nobody else gets in. It is there until Ctrl-C.
+TARGET is a run folder, a capture (pcap, recording, hex), a scenario, which runs
+in real time, or a robot's URL. A robot is not moved unless --drive is given:
+then keys, the stick or a pad drive it while held. It stops on release, on
+leaving the page, or when the page falls silent. The page is served to this
+machine only and its link holds a token. Ctrl-C ends it.
 
 \b
 Examples:

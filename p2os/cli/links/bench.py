@@ -30,12 +30,11 @@ from simbase.command_line.signals import postponed
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 from simbase.units import TIME
 
-HELP = """Measure a link to a robot, without moving it.
+HELP = """Measure the link to a robot, without moving it.
 
-Connect: from SYNC0 to the first packet. Period: between packets, as they arrive
-here. Round trip: from CONFIG to its CONFIGpac, the one question that robots
-answer; older firmware does not. On USB adapters of FTDI the latency timer
-(16 ms) shows in all of them: see docs/troubleshooting.md.
+Connect: SYNC0 to the first packet. Period: between packets as they arrive.
+Round trip: CONFIG to CONFIGpac, which older firmware does not answer. On FTDI
+adapters the latency timer (16 ms) affects all three: docs/troubleshooting.md.
 
 \b
 Examples:

@@ -12,10 +12,10 @@ import typer
 from p2os.cli.groups import LINKS
 from p2os.transport.serial_port import list_serial_ports
 
-HELP = """List the serial ports of this machine, and what may be there.
+HELP = """List the serial ports of this machine and guess their devices.
 
-Nothing is opened or sent: the guess is by the description of the USB device. To
-ask the ports themselves, use `p2os scan`.
+No port is opened: the guess uses the USB description. To probe the ports, use
+`p2os scan`.
 
 \b
 Examples:

@@ -21,13 +21,13 @@ from simbase.errors import P2osError, UsageError
 from simbase.timing import NS_PER_MS, NS_PER_S
 from simbase.units import BAUD
 
-HELP = f"""Look for robots, and identify them.
+HELP = f"""Search for robots and identify them.
 
 Without a URL it tries every serial port of this machine and {DEFAULT_URL}.
 Each serial port is tried at its own speed and at {", ".join(map(str, SEARCHED_BAUDS))} bit/s, which
-takes up to ten seconds a port. A robot that is still streaming to an earlier
-program is stopped; motors stay off. Other devices on the ports get some bytes
-that they will not understand.
+takes up to ten seconds a port. A robot that still streams to an earlier
+program is stopped; motors stay off. Other devices receive a few bytes that mean
+nothing to them.
 
 \b
 Examples:

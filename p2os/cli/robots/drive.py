@@ -19,18 +19,18 @@ from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos
 from simbase.units import ANGLE, LENGTH, SPEED, TIME, TURN_RATE
 
-HELP = """Move a robot, and leave it standing.
+HELP = """Drive a robot a distance, an angle or for a time, then stop it.
 
-A way comes before an angle; each is watched until the robot has arrived. With
---for, speeds are held for a time, and watched as well. Numbers need their units.
-A signal, an error and a lost link stop the robot first.
+The distance comes first, then the angle; each ends when the robot has arrived.
+With --for, the speeds are held for a time. Numbers need units. On a signal, an
+error or a lost link, the robot stops first.
 
 \b
 Examples:
-  p2os drive tcp:127.0.0.1:8101 --forward 0.5m              half a metre ahead
+  p2os drive tcp:127.0.0.1:8101 --forward 0.5m              half a metre forward
   p2os drive URL --forward -20cm --vel 100mm/s              back, slowly
-  p2os drive URL --forward 1m --turn 90deg                  ahead, then to the left
-  p2os drive URL --vel 0.2m/s --turn-rate 15deg/s --for 3s  a bend of three seconds
+  p2os drive URL --forward 1m --turn 90deg                  forward, then left
+  p2os drive URL --vel 0.2m/s --turn-rate 15deg/s --for 3s  an arc for three seconds
 """
 
 

@@ -16,10 +16,10 @@ from p2os.protocol.config_packet import FIELDS, ConfigPacket
 from p2os.protocol.packets import Identity
 from p2os.robots.parameters import RobotParameters
 
-HELP = """Print who a robot is, how it is set and what it senses.
+HELP = """Print a robot's identity, settings and sensors.
 
-A robot that is still streaming to an earlier program is stopped first. The
-motors stay off.
+A robot that still streams to an earlier program is stopped first. The motors
+stay off.
 
 \b
 Examples:

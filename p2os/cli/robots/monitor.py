@@ -23,11 +23,11 @@ from simbase.errors import MissingDependencyError
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 from simbase.units import TIME
 
-HELP = """Show a robot's state as it comes, without moving it.
+HELP = """Show a robot's state live, without moving it.
 
-Pose, speeds, a ring of its sonar, battery, bumpers, flags, and how good the link is.
-Ctrl-C ends. A lost robot is looked for again. Without a terminal one line a
-packet is printed.
+It shows pose, speeds, sonar ring, battery, bumpers, flags and link quality.
+Ctrl-C ends it. After a lost link it reconnects. Without a terminal it prints
+one line per packet.
 
 \b
 Examples:

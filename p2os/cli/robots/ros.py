@@ -51,12 +51,12 @@ from simbase.files import write_text
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 from simbase.units import COUNT, SPEED, TIME
 
-HELP = """Be a ROS 2 node for a robot, without ROS.
+HELP = """Run a ROS 2 node for a robot, without ROS.
 
-Publishes odometry, TF, wheels, sonar, battery and diagnostics, and the topics of
-the thesis; takes cmd_vel. The robot stops when no cmd_vel came for --deadman.
-Other programs of this machine find the node at once; --interface ADDRESS lets
-those of a network find it. For peers of this machine with stock ROS 2:
+It publishes odometry, TF, wheels, sonar, battery, diagnostics and the thesis's
+topics, and subscribes to cmd_vel. Without cmd_vel for --deadman, the robot
+stops. Programs on this machine find the node at once; --interface ADDRESS opens
+it to a network. For stock ROS 2 on this machine:
 export ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST.
 
 \b

@@ -20,21 +20,20 @@ from simbase.errors import UsageError
 from simbase.timing import NS_PER_MS, Nanos
 from simbase.units import TIME
 
-HELP = """Send one command to a robot, and show what it answers.
+HELP = """Send one command to a robot and show its answer.
 
-Names are the manuals'; the argument is checked against what the command takes
-before anything is sent. The session is closed afterwards, so a speed ends with
-it: use `p2os drive` to move.
+Use the manuals' names; the argument is checked before anything is sent. The
+session is then closed, which ends a commanded speed: to move, use `p2os drive`.
 
 \b
 Examples:
-  p2os send --list                           every command, what it takes, who knows it
-  p2os send --list gripper                   those with "gripper" in them
+  p2os send --list                           every command, its argument, its firmware
+  p2os send --list gripper                   commands with "gripper" in them
   p2os send URL SONAR 0                      sonar off
   p2os send URL ENCODER 1                    ask for an ENCODERpac and print it
   p2os send URL DIGOUT 0x03 0xff             two bytes: low first, then high
   p2os send URL SAY "hex:14 3c 14 40"        a string, as bytes
-  p2os send URL 250 126                      a number that may mean anything
+  p2os send URL 250 126                      any command by number
 """
 #: chosen: an answer comes with the next cycle of 100 ms, or the one after it.
 DEFAULT_WAIT_NS: Nanos = 500 * NS_PER_MS

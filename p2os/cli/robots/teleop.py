@@ -43,11 +43,11 @@ from simbase.errors import UsageError
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 from simbase.units import SPEED, TURN_RATE
 
-HELP = """Drive a robot with the keyboard, or with a game pad.
+HELP = """Drive a robot with the keyboard or a game pad.
 
-Hold a key to drive; let it go and the robot stops. So it does when the terminal
-hangs, the link is lost, the machine sleeps, or anything ends the program: a key
-must be pressed anew then.
+Hold a key to drive; release it to stop. The robot also stops when the terminal
+closes, the link is lost, the machine sleeps or the program ends. Press a key
+again to continue.
 
 \b
 Keys:

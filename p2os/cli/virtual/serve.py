@@ -70,29 +70,29 @@ IN_FLEET_FILE = (
     "at", "apart", "worlds_folder", "aux", "fault", "sync_limit_ns",
 )  # fmt: skip
 
-HELP = f"""Be a Pioneer robot on a line, in real time, until Ctrl-C.
+HELP = f"""Run a virtual Pioneer on a line, in real time, until Ctrl-C.
 
-ARIA, player's p2os driver, ROS nodes and this project's own programs connect to
-it as to a real robot. One client at a time; a second one is refused. When a
-client vanishes the robot stops at once and waits for the next. Type "help" while
-it runs to see the faults that can be injected, the inputs, and what can be asked.
+ARIA, player's p2os driver, ROS nodes and this project's programs connect to it
+as to a real robot, one client at a time. When a client vanishes, the robot stops
+at once and waits for the next. Type "help" while it runs for the faults to
+inject, the inputs and the queries.
 
 \b
 Examples:
   p2os serve                          a 2-DX in a room on {DEFAULT_URL}
   p2os serve --port tcp:0.0.0.0:8101  the same, for other machines too
-  p2os serve --port pty:/tmp/robot    on a terminal that programs open as a serial port
+  p2os serve --port pty:/tmp/robot    a pseudo-terminal that programs open as a serial port
   p2os serve --port serial:/dev/ttyUSB0?baud=9600
   p2os serve --world arena --seed 7   among obstacles scattered from a seed
-  p2os serve --baud 9600              bytes take the time of a real line
-  p2os serve --errors realistic       sonar, odometry and compass err as real ones
+  p2os serve --baud 9600              with the timing of a real line
+  p2os serve --errors realistic       with realistic errors of sonar, odometry and compass
   p2os serve --for aria --robot p3dx-sh   as MobileSim: laser, true pose, SIM_ commands
   p2os serve --laser 180deg,1deg,8m   with a laser of its own
   p2os serve --robots 3               three of them in one room, on ports 8101 to 8103
   p2os serve --robots 2 --at 0,0 --at 1.5m,0,180deg   face to face
-  p2os serve --fleet fleet.toml       robots of all kinds from a file
-  p2os serve --sync-limit 10s         a client that does not open a session within 10 s is dropped
-  p2os serve --fault "sonar-stuck 3 1.2"   sonar 3 gives 1.2 m whatever is there
+  p2os serve --fleet fleet.toml       robots described in a file
+  p2os serve --sync-limit 10s         drop clients without a session after 10 s
+  p2os serve --fault "sonar-stuck 3 1.2"   sonar 3 always reads 1.2 m
 """
 
 

@@ -27,11 +27,10 @@ from simbase.errors import UsageError
 from simbase.files import write_text, writing
 from simbase.units import SEED
 
-HELP = """List, draw, check, make and convert worlds.
+HELP = """List, draw, check, generate and convert worlds.
 
-A world is one that ships, a TOML file, or a file of another program: an ARIA
-map, an occupancy image with its YAML, SDF, URDF, OBJ, STL,
-COLLADA or glTF.
+A world is one that ships, a TOML file, or another program's file: an ARIA map,
+an occupancy image with its YAML, SDF, URDF, OBJ, STL, COLLADA or glTF.
 
 \b
 Examples:
@@ -45,6 +44,43 @@ Examples:
                                                   .xml (MuJoCo), .gltf, .glb
   p2os world convert room --robot p2dx --out room.sdf
   p2os world convert --robot p2dx --out p2dx.urdf
+"""
+LIST_HELP = """List the worlds that ship.
+
+\b
+Examples:
+  p2os world list
+"""
+SHOW_HELP = """Draw a world in the terminal, or into a file.
+
+\b
+Examples:
+  p2os world show maze
+  p2os world show room --out room.svg
+"""
+CHECK_HELP = """Check a world and print its content; errors name their line.
+
+A start where no p2dx can stand is an error too.
+
+\b
+Examples:
+  p2os world check my.toml
+"""
+NEW_HELP = """Generate a world from a seed.
+
+\b
+Examples:
+  p2os world new --kind maze --seed 7 --out my.toml
+"""
+CONVERT_HELP = """Write a world as TOML, or world and robot for another program.
+
+The file's ending selects the format: .toml, .sdf, .urdf, .xml (MuJoCo's
+MJCF), .gltf or .glb. What a format cannot hold is reported, a line each.
+
+\b
+Examples:
+  p2os world convert floor.yaml --out floor.toml
+  p2os world convert room --robot p2dx --out room.sdf
 """
 #: Widest drawing in a terminal, in characters.
 WIDEST_COLUMNS = 100
@@ -73,11 +109,11 @@ def register(app: typer.Typer) -> None:
     """Add the verb."""
     world = typer.Typer(help=HELP, rich_markup_mode=None)
     world.callback(invoke_without_command=True)(_without_verb)
-    world.command("list")(list_worlds)
-    world.command("show")(show)
-    world.command("check")(check)
-    world.command("new")(new)
-    world.command("convert")(convert)
+    world.command("list", help=LIST_HELP)(list_worlds)
+    world.command("show", help=SHOW_HELP)(show)
+    world.command("check", help=CHECK_HELP)(check)
+    world.command("new", help=NEW_HELP)(new)
+    world.command("convert", help=CONVERT_HELP)(convert)
     app.add_typer(world, name="world", help=HELP, rich_help_panel=ROBOTS)
 
 
@@ -90,7 +126,7 @@ def _without_verb(context: typer.Context) -> None:
 def list_worlds(
     json_output: Annotated[bool, typer.Option("--json", help="Print a JSON object.")] = False,
 ) -> None:
-    """List the worlds that ship."""
+    """List them."""
     worlds = [load_world(name) for name in known_worlds()]
     if json_output:
         typer.echo(json.dumps({world.name: world.description for world in worlds}, indent=2))
@@ -105,7 +141,7 @@ def show(
     seed: WORLD_SEED = 0,
     up: UP = "auto",
 ) -> None:
-    """Draw a world in the terminal, or into a file."""
+    """Draw one."""
     place = _load(world, seed, up)
     _print_skipped(place)
     if out is None:
@@ -120,10 +156,7 @@ def show(
 
 
 def check(world: WORLD, seed: WORLD_SEED = 0, up: UP = "auto") -> None:
-    """Read a world and print what is in it; errors name their line.
-
-    A start where no p2dx can stand is an error too.
-    """
+    """Check one."""
     place = _load(world, seed, up)
     _print_skipped(place)
     refuse_start(place, load_parameters("p2dx"), place.start, place.start_at)
@@ -140,7 +173,7 @@ def new(
     ] = 0,
     force: FORCE = False,
 ) -> None:
-    """Make a world from a seed."""
+    """Make one."""
     _write(make_world(kind, seed), out, force=force)
 
 
@@ -162,11 +195,7 @@ def convert(
     up: UP = "auto",
     force: FORCE = False,
 ) -> None:
-    """Write a world as TOML, or world and robot for another program.
-
-    The ending names the format: .toml, .sdf, .urdf, .xml (MuJoCo's MJCF), .gltf
-    or .glb. What the format does not hold is said, a line each.
-    """  # fmt: skip
+    """Convert one."""
     place = None if world is None else _load(world, seed, up)
     if place is not None:
         _print_skipped(place)

@@ -1,17 +1,19 @@
-"""Workers of this machine: each trial in a process of its own, a fork of this one, within limits of time and memory.
+"""Workers of this machine: forks of this process, each of which does one trial after the other within limits.
 
 What every trial needs (the programs, the firmware's image, the world) is loaded once, here; a fork has it and begins
-at once. Nothing of a trial outlives its process, so a hundred thousand leave no more behind than one, but for the
-states that others go on from (`beginnings`).
+at once. To make one, and to have it copy what it writes to, costs as much as 4 s of a run, so it does some trials of a
+batch before it ends. So a hundred thousand leave no more behind than these few, but for the states that others go on
+from (`beginnings`).
 
-A process that was killed from outside is done again; one that takes more than its limits is an outcome of its own,
-`ERROR`. A fork whose parent is gone ends at its next slice.
+A trial whose process was killed from outside is done again; one that takes more than its limits is an outcome of its
+own, `ERROR`. A fork whose parent is gone ends at its next slice.
 
 Invariant: what comes of a trial depends on the trial alone, not on how many run at a time, nor on their order.
 """
 
 import contextlib
 import gc
+import math
 import os
 import resource
 import signal
@@ -24,15 +26,15 @@ from pathlib import Path
 from p2os.errors import RunFailedError
 from robot_bench.campaign.campaign_file import RunLimits
 from robot_bench.campaign.trial import Done, Outcome, Trial, TrialVerdict, warm_up
-from robot_bench.campaign.workers.beginnings import Beginnings, Work, Worked
-from robot_bench.running.forks import LOOK_S, begin, how_it_ended, received
+from robot_bench.campaign.workers.beginnings import Beginnings, SavedBeginning, Work, Worked
+from robot_bench.running.forks import LOOK_S, begin, how_it_ended
 from simbase.files import writing_temporary
 from simbase.user_classes import unforeseen
 
 #: chosen: so often a trial is begun whose process or worker is killed from outside.
 MOST_TRIES = 4
-#: Between the soft and the hard limit of the processor's time, seconds.
-_GRACE_S = 5
+#: chosen: so many trials, or beginnings, a fork does before it ends.
+MOST_WORKS = 16
 MB = 1 << 20
 
 
@@ -70,30 +72,35 @@ class Processes:
         self._beginnings.run(trials, on_done, self._do, anew=anew)
 
     def _do(self, works: Sequence[Work], on_worked: Callable[[int, Worked], None]) -> None:
-        """Do all, each in a process of its own."""
+        """Do all, in as many forks as run at a time."""
         waiting = [(place, 1) for place in range(len(works))][::-1]
         running: dict[Connection, tuple[int, int, ForkProcess]] = {}
         with writing_temporary():
             made = tempfile.TemporaryDirectory(prefix="p2os-campaign-")
-        gc.freeze()
         with made as folder:
             try:
                 while running or waiting:
                     self._look()
                     while waiting and len(running) < self._at_once:
                         place, tries = waiting.pop()
-                        process, pipe = begin(_work, works[place], self._limits, os.getpid(), Path(folder))
+                        process, pipe = begin(_serve, works, place, self._limits, os.getpid(), Path(folder))
                         running[pipe] = place, tries, process
                     ready = wait(list(running), timeout=LOOK_S)
                     for pipe in [pipe for pipe in running if pipe in ready]:
                         place, tries, process = running.pop(pipe)
-                        worked = _result(process, pipe, self._limits)
+                        worked, goes_on = _result(process, pipe, self._limits)
+                        if goes_on and waiting:
+                            running[pipe] = (*waiting.pop(), process)
+                        with contextlib.suppress(OSError):  # it has ended: its result tells why
+                            pipe.send(running[pipe][0] if pipe in running else None)
+                        if pipe not in running:
+                            pipe.close()
+                            process.join()
                         if worked is None and tries < MOST_TRIES:
                             waiting.append((place, tries + 1))
                         else:
                             on_worked(place, worked or (_error("its process was killed, again and again"), 0.0))
             finally:
-                gc.unfreeze()
                 for _, _, process in running.values():
                     process.kill()
                     process.join()
@@ -102,38 +109,78 @@ class Processes:
         """Nothing is kept between runs."""
 
 
-def _work(pipe: Connection, work: Work, limits: RunLimits, parent: int, folder: Path) -> None:
-    """Do a piece of work in this fork, and send what came of it."""
+def _serve(
+    pipe: Connection, works: Sequence[Work], place: int | None, limits: RunLimits, parent: int, folder: Path
+) -> None:
+    """Do pieces of work in this fork, the first one and those that are asked for then.
+
+    Sends after each what came of it, and whether it goes on.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # of the terminal: the parent ends us
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     signal.signal(signal.SIGXCPU, signal.SIG_DFL)  # the command line's own handler would end it with a code
     tempfile.tempdir = str(folder)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    seconds = max(round(limits.cpu_s), 1)
-    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + _GRACE_S))
-    most = _mapped_bytes() + limits.memory_mb * MB
-    resource.setrlimit(resource.RLIMIT_AS, (most, most))
 
     def look() -> None:
         if os.getppid() != parent:
             raise RunFailedError("the program that began it has ended")
 
-    try:
-        found = work(look)
-    except MemoryError:
-        found = _error(f"it was refused memory; it may take {limits.memory_mb} MB")  # by that limit, or by the system
-    except Exception as error:  # noqa: BLE001  # a bug there is an error of this trial, told by its name
-        found = _error(unforeseen(error))
-    with contextlib.suppress(OSError):  # nobody waits for it any more
-        pipe.send((found, round(_cpu_s(), 3)))
+    spent_s, left = 0.0, MOST_WORKS
+    while place is not None:
+        left -= 1
+        found, is_sound = _limited(works[place], limits, look)
+        before_s, spent_s = spent_s, _cpu_s()
+        goes_on = is_sound and left > 0
+        with contextlib.suppress(OSError):  # nobody waits for it any more
+            pipe.send(((found, round(spent_s - before_s, 3)), goes_on))
+        place = _next_place(pipe, parent) if goes_on else None
     pipe.close()
 
 
-def _result(process: ForkProcess, pipe: Connection, limits: RunLimits) -> Worked | None:
-    """Return what came of a process that has ended; None where it was killed from outside."""
-    done: Worked | None = received(process, pipe)
-    if done is not None:
-        return done
+def _limited(work: Work, limits: RunLimits, look: Callable[[], None]) -> tuple[Outcome | list[SavedBeginning], bool]:
+    """Do a piece of work within limits; return what came of it, and whether this process may do another one."""
+    _limit(resource.RLIMIT_CPU, math.ceil(_cpu_s()) + max(round(limits.cpu_s), 1))
+    _limit(resource.RLIMIT_AS, _mapped_bytes() + limits.memory_mb * MB)
+    try:
+        return work(look), True
+    except MemoryError:  # by that limit, or by the system
+        return _error(f"it was refused memory; it may take {limits.memory_mb} MB"), False
+    except Exception as error:  # noqa: BLE001  # a bug there is an error of this trial, told by its name
+        return _error(unforeseen(error)), False
+
+
+def _limit(what: int, most: int) -> None:
+    """Set a limit of this process that a later piece of work may raise again."""
+    hard = resource.getrlimit(what)[1]
+    resource.setrlimit(what, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
+
+
+def _next_place(pipe: Connection, parent: int) -> int | None:
+    """Wait for what is to be done next; None: nothing, or nobody waits for it any more."""
+    gc.collect()  # what the last one has left
+    try:
+        while not pipe.poll(LOOK_S):
+            if os.getppid() != parent:
+                return None
+        place: int | None = pipe.recv()
+    except (EOFError, OSError):
+        return None
+    return place
+
+
+def _result(process: ForkProcess, pipe: Connection, limits: RunLimits) -> tuple[Worked | None, bool]:
+    """Return what came of the work of a fork, None where it was killed from outside; and whether it goes on."""
+    try:
+        worked, goes_on = pipe.recv()
+    except (EOFError, OSError):  # an OSError without a number where it was killed in the middle of sending
+        process.join()
+        return _how_it_ended(process, limits), False
+    return worked, goes_on
+
+
+def _how_it_ended(process: ForkProcess, limits: RunLimits) -> Worked | None:
+    """Return what came of work in which its process ended; None where that was killed from outside."""
     code = process.exitcode or 0
     if code in {-signal.SIGKILL, -signal.SIGTERM}:
         return None

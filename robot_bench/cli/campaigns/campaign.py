@@ -38,21 +38,20 @@ from simbase.units import COUNT
 
 HELP = """Search for worlds in which a firmware fails.
 
-A campaign file says what may vary, what has to hold, and how much may be
-spent. Cheap runs propose, runs in full confirm, and each failure was run again
-in another process with the same hash before it is told.
+A campaign file states what varies, what must hold and how much may be spent.
+Cheap runs propose failures, full runs confirm them, and another process repeats
+each with the same hash.
 
-Exit code: 0 nothing fails, 1 something does, no point has a verdict, or what a
-[[reach]] names was not reached,
-130 interrupted (--resume goes on).
+Exit code: 0 nothing fails; 1 something does, no point has a verdict, or a
+[[reach]] was not reached; 130 interrupted (--resume continues).
 
 \b
 Examples:
   p2os campaign new dodge                        write dodge-campaign.toml
   p2os campaign dodge-campaign.toml -j 2         search
   p2os campaign dodge-campaign.toml --firmware build/x.elf --runs 50
-  p2os campaign --resume campaigns/dodge-001     go on after anything was killed
-  p2os campaign c.toml --firmware new.elf --against old.elf    where do they differ?
+  p2os campaign --resume campaigns/dodge-001     continue an interrupted search
+  p2os campaign c.toml --firmware new.elf --against old.elf    points where they differ
   p2os campaign big.toml --dask local -j 4       workers of Dask
   p2os campaign c.toml --minutes 5 --out found   in a pull request, then:
   p2os campaign comment found --against good.elf --out found/comment.md

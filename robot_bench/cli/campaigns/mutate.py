@@ -39,16 +39,16 @@ from simbase.files import writing
 from simbase.timing import NS_PER_S
 from simbase.units import COUNT, PERCENT, SEED
 
-HELP = """Judge a scenario's goals by how many wrong programs they notice.
+HELP = """Test a scenario's goals by programs with planted errors.
 
-Each instruction of FIRMWARE that the scenarios run is changed, one at a time: a
-branch inverted, gone always, gone never; a comparison moved by one or made strict;
-a number moved by one; a sign turned. Each such mutant runs the scenarios that
-execute it, from just before the change matters. A goal that is missed has noticed
-it, and so has a fault. Survivors are listed: what they get wrong, nobody looks at.
+Each instruction of FIRMWARE that the scenarios execute is changed in turn: a
+branch inverted, always taken or never taken; a comparison or number moved by
+one; a sign changed. The mutant runs the scenarios that execute it, from just
+before the change matters. A missed goal or a fault notices it. Survivors are
+listed: no goal checks what they do wrong.
 
-The score of a --sample comes with an interval (95 %), and --fail-under asks its
-lower end; without --sample the score is exact.
+The score of a --sample has a 95 % interval, and --fail-under uses its lower
+end; without --sample the score is exact.
 
 Exit code: 0 done, 1 the score is below --fail-under, 2 wrong usage or file.
 

@@ -26,25 +26,25 @@ from simbase.units import COUNT, SEED
 
 #: What makes a trial cheap.
 QUICK: tuple[Setting, ...] = (("mode", "direct"), ("body", "kinematic"))
-HELP = """Make a failing run as small as it can be, and keep it as a test.
+HELP = """Reduce a failing run to its cause and keep it as a test.
 
-What can be left out is: obstacles of the world and the scenario, events, faults,
-robots, goals that are met. Numbers are made round, the run as short as its failure.
-What is left fails in the same way: the same goal, and the same side of the hull
-where it touches something; a run of its files by another process proves it.
+It removes obstacles, events, faults, robots and goals that are met, rounds
+numbers and shortens the run. The rest fails in the same way: the same goal, and
+on contact the same side of the hull. Another process confirms it.
 
-RUN is a run folder; SCENARIO a name or a TOML file that fails. The folder that is
-written holds the scenario, a test for pytest that fails as it stands, a picture,
-what `p2os explain` says, and the run with its report.
+RUN is a run folder; SCENARIO a name or a TOML file that fails. The new folder
+has the scenario, a failing pytest test, a picture, the output of
+`p2os explain`, and the run with its report.
 
-Exit code: 0 done, 1 nothing fails or the small run was not confirmed, 2 wrong usage.
+Exit code: 0 done, 1 nothing fails or the reduced run was not confirmed, 2 wrong
+usage.
 
 \b
 Examples:
-  p2os shrink runs/patrol-003                      what of that run mattered
+  p2os shrink runs/patrol-003                      the essential part of that run
   p2os shrink patrol.toml --firmware build/bad.elf --out tests/found-1
   p2os shrink patrol.toml --quick                  search on the plan view first
-  pytest tests/found-1 --firmware build/new.elf    is it mended?
+  pytest tests/found-1 --firmware build/new.elf    does the new version pass?
 """
 
 

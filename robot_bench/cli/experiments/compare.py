@@ -23,12 +23,12 @@ from simbase.units import TIME
 if TYPE_CHECKING:  # NumPy is loaded when the verb runs
     from robot_bench.experiments.comparison import Comparison
 
-HELP = """Compare how two robots drove: a run or capture with another one.
+HELP = """Compare how two robots drove, from runs or captures.
 
 A and B are run folders, recordings, pcap, CSV (t_s, x_m, y_m, heading_rad) or
-TUM files; A is the reference. B is moved in time until the speeds agree (two
-virtual runs begin at one time), and in space onto A's first pose.
-The exact comparison of two runs of one scenario is `p2os diff`.
+TUM files; A is the reference. B is aligned in time by the speeds (two virtual
+runs share their start), and in space by A's first pose. For an exact comparison
+of two runs of one scenario, use `p2os diff`.
 
 \b
 Examples:

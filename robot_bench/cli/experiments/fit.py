@@ -29,10 +29,10 @@ if TYPE_CHECKING:  # NumPy is loaded when the verb runs
 
 HELP = """Estimate a robot's parameters from recorded drives.
 
-A drive is a run folder, or a recording NAME.jsonl (pcap, …) with poses that
-were measured from outside beside it: NAME.truth.csv or NAME.truth.tum, or
---truth. Wheels and track need them; ramps do with the recording; the sonar
-needs the world too. What these drives cannot show is named and not given.
+A drive is a run folder, or a recording NAME.jsonl (pcap, ...) with measured
+poses: NAME.truth.csv, NAME.truth.tum, or --truth. Poses give wheels and track;
+the recording also gives ramps; the world also gives sonar. Parameters that the
+drives cannot show are named and not estimated.
 
 \b
 Examples:

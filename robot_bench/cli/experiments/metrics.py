@@ -17,10 +17,10 @@ from simbase.errors import UsageError
 if TYPE_CHECKING:  # NumPy is loaded when the verb runs
     from robot_bench.drives.metrics import Metrics
 
-HELP = """Measure runs: way, smoothness, clearance, energy, goals, latencies.
+HELP = """Measure path, smoothness, clearance, energy, goals and latencies.
 
-The latency of the loop is given by part: sonar ping, packet, sensor pin, motor
-pins, command, wheels. Captures and tables have what they tell of that.
+Loop latency is given by part: sonar ping, packet, sensor pin, motor pins,
+command, wheels. Captures and tables give what they contain.
 
 \b
 Examples:

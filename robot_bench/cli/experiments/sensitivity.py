@@ -28,12 +28,12 @@ from simbase.units import COUNT, SEED, TIME
 if TYPE_CHECKING:  # NumPy is loaded when the verb runs
     from robot_bench.experiments.sensitivity import ParameterEffect, Point, SampleDesign
 
-HELP = """Tell on which parameters a scenario's outcome depends.
+HELP = """Measure which parameters decide a scenario's outcome.
 
-Each KEY, one that `p2os run --set` takes, is varied from LOW to HIGH: one at a
-time with the others in the middle, in Morris' trajectories through all of them,
-and with --samples for Sobol's indices. The outcome is every goal's margin, or
-what --outcome names.
+Each KEY of `p2os run --set` varies from LOW to HIGH: one at a time with the
+others in the middle, in Morris' trajectories through all of them, and with
+--samples for Sobol's indices. The outcome is every goal's margin, or what
+--outcome names.
 
 \b
 Examples:

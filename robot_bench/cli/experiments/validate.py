@@ -47,13 +47,13 @@ REPORT, FIGURES = "validation.html", "validation.json"
 MOST_SHOWN = 20
 HELP = """Validate the bench by experiments: motors, sensors, encoders.
 
-Each EXPERIMENT has a hypothesis, figures with units, and a bound for each, whose
-formula stands beside it in the report. Without names all are run: motors, codes,
-capped, sensors, sensors-all, only-while-seen, encoders, sparse, slip, silence,
-long-drive, dodge. Each is run pins straight to the body, through the adapter's model, and
-through its firmware, with every body that is installed.
+Each EXPERIMENT has a hypothesis and figures with units and bounds; the report
+shows each bound's formula. Without names all run: motors, codes, capped,
+sensors, sensors-all, only-while-seen, encoders, sparse, slip, silence,
+long-drive, dodge. Each runs with pins straight to the body, through the
+adapter's model and through its firmware, with every installed body.
 
---set runs the bench otherwise than it is expected to be: a planted error.
+--set plants an error for a figure to detect.
 
 Exit code: 0 every figure is within its bound, 1 one is not, 2 wrong usage, 130
 interrupted.
@@ -62,8 +62,8 @@ interrupted.
 Examples:
   p2os validate                               all, some minutes
   p2os validate motors --body kinematic       one experiment, one body
-  p2os validate motors --set threshold_m=0.4  a planted error: which figure tells?
-  p2os validate --port serial:/dev/ttyUSB0    what a real Pioneer can do; asks first
+  p2os validate motors --set threshold_m=0.4  a planted error
+  p2os validate --port serial:/dev/ttyUSB0    a real Pioneer; asks first
 """
 
 

@@ -24,16 +24,15 @@ from robot_bench.firmware.build import COMPILER
 from simbase.errors import P2osError, UsageError, shown_name
 from simbase.files import read_text, write_text
 
-HELP = """Write a project of your own, or a bench beside one that is there.
+HELP = """Write a new project, or a bench beside an existing one.
 
-FOLDER is new or empty. It gets one C file to change, start-up code, linker
-script, register names, what builds it, a scenario, tests, what CI services
-and a debugger in an editor need, and a README.
+FOLDER is new or empty. It gets a C file to change, start-up code, linker
+script, register names, a build, a scenario, tests, settings for CI and for a
+debugger, and a README.
 
-With --from, the program and sources of a project that is there are found
-(PlatformIO, STM32CubeIDE, STM32CubeMX, Arduino, CMake, Zephyr, Rust, make),
-and a scenario and tests are written beside them, into bench/. No file of the
-project is changed.
+--from finds the program and sources of an existing project (PlatformIO,
+STM32CubeIDE, STM32CubeMX, Arduino, CMake, Zephyr, Rust, make) and writes a
+scenario and tests into its folder bench/. The project's files stay unchanged.
 
 \b
 Examples:

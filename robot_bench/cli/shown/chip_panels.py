@@ -7,32 +7,48 @@ Invariant: a look changes nothing of the run.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Literal, TypeAlias
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Literal, TypeAlias, cast
 
+from bluepill_sim.analysis.coverage import Coverage
+from bluepill_sim.analysis.program_lines import program_lines
 from bluepill_sim.board import BluePill
 from bluepill_sim.debug.chip_state import (
     CoreRow,
+    ProgramPlace,
     clock_rows,
     core_rows,
     exception_rows,
     source_place,
     stack_rows,
 )
+from bluepill_sim.errors import ImageError
 from bluepill_sim.fabric.pins import Pin
 from p2os.view.header import (
     PageBlock,
     PageCell,
     PageDrawing,
     PageSection,
+    PageSource,
     PageTable,
     PageText,
     PictureShape,
 )
 from p2os.view.targets import ViewPanel
+from robot_bench.events.codec import Json
+from robot_bench.view.program_sections import PROGRAM, program_sections, source_block
 from simbase.timing import NS_PER_S
 
 _Align: TypeAlias = Literal["start", "middle", "end"]
 NVIC, CLOCKS = "NVIC", "clock tree"
+#: Of the program: its next line, and what has run of it.
+NEXT, RAN = "next line", "what has run"
+#: chosen: lines shown on either side of the next one.
+LINES_AROUND = 6
+#: chosen: so many instructions are counted at a look; 5 ms on a quiet machine.
+INSTRUCTIONS_A_LOOK = 8000
 #: The pins of the board's two headers, from the USB socket on (BluePill, schematic of its makers); others are supplies.
 LEFT = (
     "PB12", "PB13", "PB14", "PB15", "PA8", "PA9", "PA10", "PA11", "PA12", "PA15", "PB3", "PB4",
@@ -55,8 +71,8 @@ def program_panel(subject: object) -> ViewPanel | None:
     """Return the panel of where the program stands; None where no emulated chip runs."""
     if not isinstance(subject, BluePill):
         return None
-    board = subject
-    return ViewPanel("program", "Program", (), lambda _choice: _program(board))
+    board, running = subject, _RunningProgram(subject)
+    return ViewPanel(*PROGRAM, (NEXT, RAN), lambda choice: running.ran() if choice == RAN else _program(board, running))
 
 
 def registers_panel(subject: object) -> ViewPanel | None:
@@ -75,14 +91,55 @@ def board_panel(subject: object) -> ViewPanel | None:
     return ViewPanel("board", "Board", (), lambda _choice: _board(board))
 
 
-def _program(board: BluePill) -> list[PageSection]:
+class _RunningProgram:
+    """What has run of a board's program so far: counted anew where anything new has run since.
+
+    The board knows which blocks it has entered at no cost to the run. Counting takes some 20 ms of a program of 16 KB;
+    of larger ones it is done at each second, third, … look only.
+    """
+
+    def __init__(self, board: BluePill) -> None:
+        self._board = board
+        self._known = -1, -1
+        self._looks_left = 0
+        self._lines: Json = {"files": [], "functions": []}
+
+    @property
+    def lines(self) -> Json:
+        """As of `program_lines`."""
+        if self._looks_left:
+            self._looks_left -= 1
+            return self._lines
+        blocks, ways = self._board.entered_blocks, self._board.gone_ways
+        if (len(blocks), len(ways)) != self._known:
+            self._known = len(blocks), len(ways)
+            with suppress(ImageError):  # the file has been built anew meanwhile
+                coverage = Coverage.of_board(self._board, blocks, ways)
+                self._lines = program_lines(coverage, Path(self._board.image.name).parent)
+            functions = cast("list[list[int]]", self._lines["functions"])
+            self._looks_left = sum(row[2] for row in functions) // INSTRUCTIONS_A_LOOK
+        return self._lines
+
+    def ran(self) -> list[PageSection]:
+        """Return the sections of what has run."""
+        return program_sections(self.lines)
+
+    def around(self, place: ProgramPlace) -> PageSource | None:
+        """Return the lines around a place, with what has run of them."""
+        file = next((one for one in cast("list[Json]", self.lines["files"]) if one["name"] == place.file), None)
+        first, last = max(1, place.line - LINES_AROUND), place.line + LINES_AROUND
+        return None if file is None else source_block(file, first, last, place.line)
+
+
+def _program(board: BluePill, running: _RunningProgram) -> list[PageSection]:
     place, asleep = source_place(board), ", asleep" if board.is_asleep else ""
     note = f"{board.now_ns / NS_PER_S:.9f} s, {board.cycle} cycles{asleep}"
-    listing = PageText(text=board.where(), is_listing=True)
+    listing: PageBlock = PageText(text=board.where(), is_listing=True)
     if place is not None:
-        rows = [f"{'→' if number == place.line else ' '} {number:4} {line}" for number, line in place.around]
-        words = "\n".join(rows) or f"line {place.line} in {place.function}; its file is not to be had"
-        listing = PageText(title=f"{place.file}:{place.line} in {place.function}", text=words, is_listing=True)
+        title = f"{place.file}:{place.line} in {place.function}"
+        words = f"line {place.line} in {place.function}; its file is not to be had"
+        source = running.around(place)
+        listing = PageText(title=title, text=words, is_listing=True) if source is None else replace(source, title=title)
     core, stack = ("register", "value", ""), ("address", "word", "")
     return [
         PageSection(title="Next line", note=note, blocks=[listing]),

@@ -1,26 +1,17 @@
-"""What the bench has to show: run folders, and scenarios as they run (entry points of `p2os.view_sources`)."""
+"""What the bench has to show: run folders, and scenarios as they run (entry points of `p2os.view_sources`).
+
+What runs and reads is imported where it is needed: a long run that was kept opens without the bench.
+"""
 
 import contextlib
 import gc
 from collections.abc import Iterator
-from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
-from bluepill_sim.cli.gdb_server import GdbPort
 from p2os.view.live import StillRecording
 from p2os.view.targets import ViewTarget
-from robot_bench.cli.debugging.gdb import say_where
-from robot_bench.cli.shown.live_run import LiveRun
-from robot_bench.recording.run_folder import make_next_folder
-from robot_bench.recording.run_record import TRACE_NAME, read_run
-from robot_bench.recording.summary import outcome_of, outcome_of_all
-from robot_bench.recording.together import robots_in, scenario_of
-from robot_bench.report.page_of_all import report_of_all
-from robot_bench.report.run_page import run_report, run_sections
-from robot_bench.run import run_scenario
-from robot_bench.scenario.loading import known_scenarios, load_scenario
-from robot_bench.scenario.scenario import Scenario
+from robot_bench.recording.run_record import TRACE_NAME
+from robot_bench.view.kept_recording import is_long, keep, kept
 
 
 def run_target(named: str) -> ViewTarget | None:
@@ -32,14 +23,40 @@ def run_target(named: str) -> ViewTarget | None:
     folder = Path(named)
     if (folder / TRACE_NAME).is_file():
         with _without_collecting():
-            record = read_run(folder)
-            source = StillRecording(run_report(record, is_measured=False))
-        return ViewTarget(source=source, run=lambda: source.show(run_sections(record)))
-    if names := robots_in(folder):
-        records = {name: read_run(folder / name) for name in names}
-        outcome = outcome_of_all(scenario_of(folder), {name: outcome_of(one) for name, one in records.items()})
-        return ViewTarget(source=StillRecording(report_of_all(outcome, records)))
-    return None
+            found = kept(folder)
+            return _read_target(folder) if found is None else ViewTarget(source=StillRecording(found))
+    return _target_of_all(folder)
+
+
+def _read_target(folder: Path) -> ViewTarget:
+    """Return a run out of its trace; its figures are shown when they are there, and all of it is kept."""
+    from robot_bench.recording.run_record import read_run
+    from robot_bench.report.run_page import run_report, run_sections
+
+    record = read_run(folder)
+    source = StillRecording(run_report(record, is_measured=False))
+
+    def finish() -> None:
+        sections = run_sections(record)
+        source.show(sections)
+        if is_long(folder):  # of rows of its own: the server fills those that are shown when somebody looks
+            keep(run_report(record, is_measured=False), folder, sections)
+
+    return ViewTarget(source=source, run=finish)
+
+
+def _target_of_all(folder: Path) -> ViewTarget | None:
+    from robot_bench.recording.together import robots_in, scenario_of
+
+    if not (names := robots_in(folder)):
+        return None
+    from robot_bench.recording.run_record import read_run
+    from robot_bench.recording.summary import outcome_of, outcome_of_all
+    from robot_bench.report.page_of_all import report_of_all
+
+    records = {name: read_run(folder / name) for name in names}
+    outcome = outcome_of_all(scenario_of(folder), {name: outcome_of(one) for name, one in records.items()})
+    return ViewTarget(source=StillRecording(report_of_all(outcome, records)))
 
 
 @contextlib.contextmanager
@@ -62,28 +79,10 @@ def scenario_target(named: str) -> ViewTarget | None:
     Raises:
         ScenarioError: Its file cannot be run.
     """
+    from robot_bench.scenario.loading import known_scenarios, load_scenario
+
     if named not in known_scenarios() and not named.endswith(".toml"):
         return None
-    scenario = load_scenario(named, trust=False)
-    return replace(_live_target(scenario), debugged=partial(_debugged, scenario))
+    from robot_bench.cli.shown.live_target import live_target
 
-
-def _debugged(scenario: Scenario, port: int) -> ViewTarget:
-    opened = GdbPort(port)
-    say_where(opened.port, scenario)
-    return _live_target(scenario, opened)
-
-
-def _live_target(scenario: Scenario, gdb: GdbPort | None = None) -> ViewTarget:
-    live = LiveRun(scenario, gdb=gdb)
-    live.stays = True
-
-    def run() -> None:
-        with contextlib.closing(gdb) if gdb is not None else contextlib.nullcontext():
-            done = run_scenario(scenario, make_next_folder(scenario.name), drive=live.drive)
-            if done.was_interrupted:
-                raise KeyboardInterrupt
-            live.source.report(run_report(read_run(done.folder)).header)
-            live.stay()
-
-    return ViewTarget(source=live.source, run=run)
+    return live_target(load_scenario(named, trust=False))

@@ -61,11 +61,13 @@ _Heading = Annotated[float, Key(least=-360, most=360, doc="counter-clockwise fro
 class BridgeDescription(Record):
     """`[bridge]`: an H-bridge."""
 
-    kind: Annotated[BridgeKind, Key(doc="which pins it has")]
-    off: Annotated[Off, Key(doc="what it does with a motor that it does not drive")] = Off.BRAKE
+    kind: Annotated[BridgeKind, Key(doc="by its pins: TB6612FNG, L298N; DRV8835; DRV8833, BTS7960")]
+    off: Annotated[Off, Key(doc="while it does not drive")] = Off.BRAKE
     resistance_ohm: Annotated[float, Key(least=0, most=_MOST_OHM, doc="of both switches together")] = 0.0
     drop_v: Annotated[float, Key(least=0, most=10, doc="of bipolar transistors")] = 0.0
-    dead_time_us: Annotated[float, Key(least=0, most=100, doc="a shorter pulse does nothing")] = 0.0
+    dead_time_us: Annotated[
+        float, Key(least=0, most=100, doc="from a pulse to its effect; a shorter one does nothing")
+    ] = 0.0
 
     @property
     def dead_time_ns(self) -> int:
@@ -87,7 +89,7 @@ class Motor(Record):
 class Encoder(Record):
     """`[encoder]`: a quadrature encoder: four edges a line."""
 
-    lines: Annotated[float, Key(least=1, most=100_000, doc="a turn")]
+    lines: Annotated[float, Key(least=1, most=100_000, doc="a turn, four edges each")]
     on: Annotated[Literal["motor", "wheel"], Key(doc="what it turns with")] = "motor"
 
     def edges_per_turn(self, motor: Motor) -> float:
@@ -98,11 +100,11 @@ class Encoder(Record):
 class BatteryDescription(Record):
     """`[battery]`: the battery, what else it feeds, and the divider at which the chip measures it."""
 
-    full_v: Annotated[float, Key(above=0, most=_MOST_V, doc="full")]
-    empty_v: Annotated[float, Key(above=0, most=_MOST_V, doc="empty")]
+    full_v: Annotated[float, Key(above=0, most=_MOST_V, doc="without load, when full")]
+    empty_v: Annotated[float, Key(above=0, most=_MOST_V, doc="without load, when empty; it falls linearly")]
     capacity_ah: Annotated[float, Key(above=0, most=10_000, doc="from full to empty")]
-    charge: Annotated[float, Key(least=0, most=1, doc="how much of it is left as a run begins")] = 1.0
-    resistance_ohm: Annotated[float, Key(least=0, most=100, doc="inside")]
+    charge: Annotated[float, Key(least=0, most=1, doc="at the start; a scenario's `charge` wins")] = 1.0
+    resistance_ohm: Annotated[float, Key(least=0, most=100, doc="internal")]
     idle_current_a: Annotated[float, Key(least=0, most=100, doc="of all but the motors")] = 0.0
     divider_top_ohm: Annotated[float, Key(least=0, most=1e8, doc="from the battery to the pin")]
     divider_bottom_ohm: Annotated[float, Key(above=0, most=1e8, doc="from the pin to ground")]
@@ -125,7 +127,7 @@ class DistanceSensor(Record):
     y_m: Along
     heading_deg: _Heading
     curve: Annotated[tuple[tuple[float, float], ...], Key(
-        kind="points", count=2, least=0, most=100, doc="[metres, volts], nearest first"
+        kind="points", count=2, least=0, most=100, doc="[metres, volts], nearest first; default a GP2Y0A21YK"
     )] = GP2Y0A21  # fmt: skip
 
 

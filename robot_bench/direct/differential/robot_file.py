@@ -39,7 +39,9 @@ class BodyTable(Record):
 
     track_m: Annotated[float, Key(least=0.02, most=MOST_M, doc="from wheel to wheel")]
     mass_kg: Annotated[float, Key(least=0.3, most=1000, doc="of all")]
-    yaw_inertia_kg_m2: Annotated[float | None, Key(least=1e-6, most=10_000, doc="unset that of a box")] = None
+    yaw_inertia_kg_m2: Annotated[
+        float | None, Key(least=1e-6, most=10_000, doc="about the middle of the axle; default a box of the hull's size")
+    ] = None
     wheel_diameter_m: Annotated[float, Key(least=0.01, most=2, doc="of a driven wheel")]
     wheel_width_m: Annotated[float, Key(least=0.001, most=1, doc="of a driven wheel")]
     wheel_mass_kg: Annotated[float, Key(least=0.001, most=100, doc="of a driven wheel")]
@@ -66,12 +68,12 @@ class DifferentialTable(Record):
 
     kind: Annotated[str, Key(doc="`differential`")]
     title: Annotated[str, Key(doc="what reports call it")] = "differential robot"
-    body: Annotated[BodyTable, Key(doc="the robot as a physical thing")]
+    body: Annotated[BodyTable, Key(doc="hull, wheels and caster")]
     bridge: Annotated[BridgeDescription, Key(doc="the H-bridges")]
     motor: Annotated[Motor, Key(doc="the motors with their gears")]
     encoder: Annotated[Encoder, Key(doc="the quadrature encoders")]
     battery: Annotated[BatteryDescription, Key(doc="the battery and its divider")]
-    pins: Annotated[Mapping[str, object], Key(doc="signal = pin of the BluePill")]
+    pins: Annotated[Mapping[str, object], Key(doc="signal = pin of the BluePill, each once")]
     distance_period_ms: Annotated[float, Key(least=1, most=10_000, doc="from one measurement to the next")] = 38.3
     distance: Annotated[tuple[Table, ...], Key(record=DistanceSensor, doc="analog distance sensors")] = ()
     bumper: Annotated[tuple[Table, ...], Key(record=Bumper, doc="switches at the hull")] = ()

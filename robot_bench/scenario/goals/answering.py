@@ -34,6 +34,7 @@ class MotorWatch(Watch):
     """Follows the motors' pins and those of sensors, and is asked about each span in which they stayed as they were."""
 
     STATE: ClassVar[tuple[str, ...]] = ("_levels", "_changed", "_failure")
+    DERIVED: ClassVar[tuple[str, ...]] = ("_values", "_motions")
     kinds = (PinEdge,)
 
     def __init__(self, *pins: str) -> None:
@@ -46,13 +47,20 @@ class MotorWatch(Watch):
         #: When the last of them changed.
         self._changed: Nanos = 0
         self._failure = ""
+        #: What follows from the levels, worked out once while they stay; None: not since they changed.
+        self._values: tuple[int, int] | None = None
+        self._motions: str | None = None
 
     def feed(self, event: Event) -> GoalOutcome | None:
         if not isinstance(event, PinEdge) or event.wire not in self.wires:
             return None
         outcome = self.advance_to(event.t)
         self._levels[event.wire], self._changed = event.level, event.t
+        self._restored()
         return outcome
+
+    def _restored(self) -> None:
+        self._values = self._motions = None
 
     def advance_to(self, limit: Nanos) -> GoalOutcome | None:
         if limit - self._changed < SKEW_NS:
@@ -72,19 +80,22 @@ class MotorWatch(Watch):
     @property
     def values(self) -> tuple[int, int]:
         """The motors' values, left and right."""
-        left, right = (
-            motor_value(sum(self._levels.get(net, False) << bit for bit, net in enumerate(nets)), len(nets))
-            for nets in self._motors
-        )
-        return left, right
+        if self._values is None:
+            left, right = (
+                motor_value(sum(self._levels.get(net, False) << bit for bit, net in enumerate(nets)), len(nets))
+                for nets in self._motors
+            )
+            self._values = left, right
+        return self._values
 
     @property
     def motion(self) -> str:
         """What the motors are asked for."""
-        left, right = self.values
-        if left == right == 0:
-            return "stand"
-        return "turn" if left + right == 0 else "forward" if left + right > 0 else "back"
+        if self._motions is None:
+            left, right = self.values
+            moves = "turn" if left + right == 0 else "forward" if left + right > 0 else "back"
+            self._motions = "stand" if left == right == 0 else moves
+        return self._motions
 
     def finish(self, end: Nanos) -> GoalOutcome:
         return GoalOutcome(met=not self._failure, says=self._failure)
@@ -110,17 +121,26 @@ class Answers(MotorWatch):
     """While pins are so, the motors' values are in bounds, but for so long."""
 
     STATE = ("_since", "_longest", "_longest_at")
+    DERIVED = ("_wrong",)
 
     def __init__(self, table: AnswersTable) -> None:
         super().__init__(*table.high, *table.any_high, *table.low)
         self._table, self._within = table, nanos(table.within_s)
+        #: Whether the levels are out of bounds; None: not worked out since they changed.
+        self._wrong: bool | None = None
         #: From when they are out of bounds now.
         self._since: Nanos | None = None
         self._longest: Nanos = 0
         self._longest_at: Nanos = 0
 
+    def _restored(self) -> None:
+        super()._restored()
+        self._wrong = None
+
     def stayed(self, since: Nanos, until: Nanos) -> None:
-        if not self._is_wrong():
+        if self._wrong is None:
+            self._wrong = self._is_wrong()
+        if not self._wrong:
             self._since = None
             return
         self._since = since if self._since is None else self._since

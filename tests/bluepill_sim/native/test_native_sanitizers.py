@@ -55,7 +55,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Build the library; the interpreter's dispatch by a switch, since all other tests run the other one."""
     library = tmp_path_factory.mktemp("built") / "core.so"
     run(
-        "gcc", "-std=c11", "-O1", "-g1", "-Wall", "-Wextra", "-Wconversion", "-Wno-sign-conversion", "-Werror", "-fPIC",
+        "gcc", "-std=c11", "-Og", "-g1", "-Wall", "-Wextra", "-Wconversion", "-Wno-sign-conversion", "-Werror", "-fPIC",
         "-shared", "-fsanitize=address,undefined", "-fno-sanitize-recover=all",
         "-DINTERPRETER_PORTABLE", "-o", str(library), *map(str, SOURCES),
     )  # fmt: skip

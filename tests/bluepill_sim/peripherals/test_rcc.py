@@ -246,6 +246,17 @@ def test_the_clock_security_system_takes_hsi_and_raises_nmi_until_it_is_cleared(
     assert fake_chip.signals == ["nmi"] * 3
 
 
+def test_an_oscillator_may_be_ready_in_the_nanosecond_of_an_nmi(fake_chip: Any) -> None:
+    set_bits(fake_chip, "RCC.CR", HSEON | CSSON)
+    fake_chip.advance(2_000_000)
+    fake_chip.parts.rcc.fail_crystal()  # an NMI each microsecond from now on
+    fake_chip.parts.rcc.repair_crystal()
+    set_bits(fake_chip, "RCC.CR", HSEON)
+    fake_chip.advance(4_000_000)
+    assert fake_chip.read("RCC.CR") & HSERDY
+    assert fake_chip.signals == ["nmi"] * 2001
+
+
 def test_without_css_a_crystal_in_use_takes_the_core_with_it(fake_chip: Any) -> None:
     set_bits(fake_chip, "RCC.CR", HSEON)
     fake_chip.advance(2_000_000)

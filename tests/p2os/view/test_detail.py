@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from p2os.view.detail import RUN, Extremes, buckets, changes, curve, rows_in, thinned_list
+from p2os.view.detail import RUN, Extremes, buckets, changes, curve, curve_of, rows_in, thinned_list
 from p2os.view.frames import FrameFlags
 from p2os.view.header import ChannelHeader
 from p2os.view.recording import ChannelTrack
@@ -75,6 +75,30 @@ def test_a_curve_keeps_what_stands_out(times: list[int], pixels: int, data: st.D
     assert len(rows) <= 4 * pixels
 
 
+@pytest.mark.parametrize("last_row", [9_999, 6_499])  # 100 rows a pixel: by the index; 65: by it or directly
+def test_a_curve_has_the_least_and_the_greatest_of_each_pixel(last_row: int) -> None:
+    values = [(n * 7919) % 1000 for n in range(last_row + 1)]
+    chosen = curve_of(range(last_row + 1), [values], 100)
+    assert list(chosen) == sorted(set(chosen))
+    pixel_of = [n * 100 // (last_row + 1) for n in range(last_row + 1)]
+    for pixel in range(100):
+        here = [values[n] for n in range(last_row + 1) if pixel_of[n] == pixel]
+        shown = [values[n] for n in chosen if pixel_of[n] == pixel]
+        assert (min(shown), max(shown)) == (min(here), max(here))
+    assert curve_of(range(400), [range(400)], 100) == range(400)
+    assert len(curve_of(range(401), [[*range(401)]], 100)) < 401
+    assert not curve_of([], [[]], 100)
+
+
+@pytest.mark.parametrize("first", [0, 1])
+@pytest.mark.parametrize("count", [4001, 4002])
+def test_changes_keep_both_levels_of_every_pixel(count: int, first: int) -> None:
+    rows = [row for row, _ in changes(range(count), 0, count, 40)]
+    for pixel in range(40):
+        assert {(row + first) & 1 for row in rows if row * 40 // count == pixel} == {0, 1}
+    assert not list(changes([], 0, 0, 40))
+
+
 @given(TIMES, st.integers(-5, 1005), st.integers(0, 500))
 def test_a_stretch_has_what_is_in_force_before_it_and_the_first_behind(
     times: list[int], begin: int, length: int
@@ -118,7 +142,7 @@ def test_a_sample_that_is_no_number_hides_no_extreme() -> None:
     track = ChannelTrack(ChannelHeader(name="x", kind="samples"))
     for n in range(200):
         track.append(n, float("nan") if n in {0, 90} else 7.0 if n == 91 else 5.0 if n == 92 else 6.0)
-    assert {5.0, 6.0, 7.0} <= set(track.frame(0, 199, 2).columns[1])  # type: ignore[arg-type]  # numbers
+    assert {5.0, 6.0, 7.0} <= set(track.frame(0, 199, 2).columns[1])
 
 
 def test_ranges_are_thinned_by_the_nearest_echo_row_by_row() -> None:

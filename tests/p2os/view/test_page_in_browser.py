@@ -20,7 +20,9 @@ from p2os.view.header import (
     PageHeader,
     PageList,
     PageSection,
+    PageSource,
     PageTable,
+    PanelHeader,
     RobotHeader,
     SensorPlace,
     StateTransition,
@@ -46,6 +48,9 @@ def recording() -> ViewRecording:
         title=f"run {HOSTILE}", verdict="failed", standing="failed", lead=HOSTILE, why=HOSTILE, footer=HOSTILE,
         end_ns=SECONDS * S, left_out=[HOSTILE],
         robots=[RobotHeader(name="", model=HOSTILE, front_m=0.2, rear_m=0.2, width_m=0.4)],
+        panels=[PanelHeader(name="program", title="Program", sections=[PageSection(title=HOSTILE, blocks=[
+            PageSource(title=HOSTILE, lines=[HOSTILE, "b", "c", "d"], first=7, ran_ns=[0, S, -1, -2], one_way=[7]),
+        ])])],
         world=WorldHeader(name=HOSTILE, extent_m=(-2.0, -2.0, 2.0, 2.0), things=[
             WorldThing(name=HOSTILE, kind="obstacle", shape="box", x_m=1.0, y_m=1.0, length_m=0.5, width_m=0.5),
             WorldThing(name="pole", kind="obstacle", shape="cylinder", x_m=-1.0, y_m=1.0, radius_m=0.2),
@@ -167,6 +172,7 @@ def test_hostile_texts_are_shown_as_texts_and_nothing_runs(seen: dict[str, Any])
 def test_views_stand_by_what_the_run_has_in_landmarks(seen: dict[str, Any]) -> None:
     assert sorted(seen["tabs"]) == sorted([
         "Plan", "3D", "Plots", "Logic analyser", "Report", "Goals", "State machine", "Events", "Consoles", "Packets",
+        "Program",
     ])  # fmt: skip
     assert seen["landmarks"] == ["header", "main", "section"]
 
@@ -187,6 +193,11 @@ def test_keys_move_time_cursors_and_window(seen: dict[str, Any]) -> None:
     assert (state["0"]["from"], state["0"]["to"]) == (0, end)
     assert (state["play"]["playing"], state["pause"]["playing"]) == (True, False)
     assert state["play"]["now"] > 0
+
+
+@pytest.mark.slow
+def test_lines_of_the_program_have_run_by_the_pages_time(seen: dict[str, Any]) -> None:
+    assert seen["lines"] == ["part not not none", "part ran not none"]
 
 
 @pytest.mark.slow

@@ -1,6 +1,7 @@
 """A campaign from its file to its folder, with runs of seconds: the same set whatever happens on the way."""
 
 import contextlib
+import gc
 import itertools
 import json
 import os
@@ -8,6 +9,7 @@ import random
 import signal
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
@@ -483,8 +485,9 @@ def outcomes(workers: Processes, trials: Sequence[Trial]) -> dict[int, Outcome]:
 def test_a_process_comes_to_what_this_one_comes_to(trials: list[Trial], monkeypatch: pytest.MonkeyPatch) -> None:
     warmed: list[Trial] = []
     monkeypatch.setattr(processes, "warm_up", lambda trial: (warmed.append(trial), warm_up(trial)))
-    workers = Processes(2, RunLimits())
+    workers, frozen = Processes(2, RunLimits()), gc.get_freeze_count()
     found = outcomes(workers, trials)
+    assert gc.get_freeze_count() == frozen, "what this process keeps out of the search for garbage stays out"
     other = trials[0].set(("mode", "adapter"))
     outcomes(workers, [trials[0], other])
     assert warmed == [trials[0], other], "what is loaded is not loaded again"
@@ -505,6 +508,43 @@ def test_a_process_that_was_killed_is_begun_again(trials: list[Trial], tmp_path:
     found = outcomes(Processes(2, RunLimits()), trials)
     assert [found[place].verdict for place in range(3)] == [run_trial(trial).verdict for trial in trials]
     assert len(list(tmp_path.iterdir())) == 3
+
+
+def test_a_process_does_some_trials_and_none_after_one_that_it_broke_at(trials: list[Trial], monkeypatch) -> None:  # type: ignore[no-untyped-def]
+    from robot_bench.campaign.workers import beginnings
+
+    def where(trial: Trial, look: Callable[[], None], start: object) -> Outcome:
+        if trial.seed == 3:
+            raise KeyError(trial.seed)
+        return Outcome(verdict=TrialVerdict.PASSED, sha256=str(os.getpid()))
+
+    monkeypatch.setattr(beginnings, "run_trial", where)
+    monkeypatch.setattr(processes, "MOST_WORKS", 2)
+    found = outcomes(Processes(1, RunLimits()), [trials[0].set(("seed", seed)) for seed in range(6)])
+    pids = [found[place].sha256 for place in range(6)]
+    assert pids[0] == pids[1] != pids[2]
+    assert pids[4] == pids[5] not in pids[:4]
+    assert found[3].failures == ("this is a bug: KeyError: 3",)
+
+
+@pytest.mark.parametrize("while_it_waits", [True, False])
+def test_a_process_that_is_killed_between_two_trials_loses_none(
+    while_it_waits: bool, trials: list[Trial], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from robot_bench.campaign.workers import beginnings
+
+    def where(trial: Trial, look: Callable[[], None], start: object) -> Outcome:
+        return Outcome(verdict=TrialVerdict.PASSED, sha256=f"{trial.seed} {os.getpid()}")
+
+    def killed(pipe: Connection, _parent: int) -> int | None:
+        place: int | None = None if while_it_waits else pipe.recv()
+        os.kill(os.getpid(), signal.SIGKILL)
+        return place
+
+    monkeypatch.setattr(beginnings, "run_trial", where)
+    monkeypatch.setattr(processes, "_next_place", killed)
+    found = outcomes(Processes(1, RunLimits()), [trials[0].set(("seed", seed)) for seed in range(3)])
+    assert [found[place].sha256.split()[0] for place in range(3)] == ["0", "1", "2"]
 
 
 @pytest.mark.slow

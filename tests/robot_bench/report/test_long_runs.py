@@ -2,14 +2,15 @@
 
 from array import array
 from dataclasses import replace
+from typing import Any, cast
 
 import pytest
 
 from p2os.protocol.packets import EncoderPacket
 from robot_bench.events.kinds import Contact, Note, Packet, WorldChange
 from robot_bench.recording.run_record import RunRecord
+from robot_bench.report.drawn import PIN_PIXELS, PIXELS, drawn_of
 from robot_bench.report.run_page import render_run
-from robot_bench.report.thinning import extremes, pulses
 from robot_bench.wires.edges import Edges
 from tests.p2os.view.pages import ReadPage
 from tests.robot_bench.recording.records import S, pose
@@ -81,33 +82,21 @@ def test_what_stands_out_is_kept(long: RunRecord, page: ReadPage) -> None:
     assert sum(row[2] for row in edges) == len(long.pins["DD1"])
 
 
+def test_plots_of_an_hour_are_drawn_of_bounded_many_rows_and_keep_what_stands_out(long: RunRecord) -> None:
+    drawn = cast("dict[str, list[list[float]]]", drawn_of(long))
+    assert max(row[4] for row in drawn["poses"]) == 0.999
+    assert len(drawn["poses"]) <= 10 * PIXELS
+    pins = [rows for _, nets in cast("list[Any]", drawn["pins"]) for _, rows in nets]
+    assert pins
+    for rows in pins:
+        assert len(rows) <= 3 * PIN_PIXELS
+        assert {level for _, level in rows[1:40]} == {0, 1}
+    assert not drawn_of(replace(long, pins={"DD1": Edges()}))["pins"][0][1][0][1]  # type: ignore[index]  # JSON
+
+
 def test_a_minute_is_shown_whole() -> None:
     run = long_run(60)
     run.pins = {net: edges[:200] for net, edges in run.pins.items()}
     page = ReadPage(render_run(run))
     assert page.header["left_out"] == []
     assert [len(page.rows(name)) for name in ("pose", "P2OS", "usart1")] == [1200, 1200, 600]
-
-
-def test_extremes_keep_the_least_and_the_greatest_of_each_bucket_in_order() -> None:
-    rows = [(n, (n * 7919) % 1000) for n in range(10_000)]
-    chosen = extremes([at for at, _ in rows], [[value for _, value in rows]], buckets=100)
-    assert chosen == sorted(set(chosen))
-    assert len(chosen) <= 4 * 101
-    kept = [rows[n] for n in chosen]
-    for bucket in range(100):
-        here = [value for at, value in rows if int(at / 99.99) == bucket]
-        shown = [value for at, value in kept if int(at / 99.99) == bucket]
-        assert (min(shown), max(shown)) == (min(here), max(here))
-    assert extremes(range(50), [range(50)], buckets=100) == list(range(50))
-
-
-@pytest.mark.parametrize("first", [0, 1])
-@pytest.mark.parametrize("count", [4001, 4002])
-def test_pulses_keep_both_levels_of_every_bucket(count: int, first: int) -> None:
-    edges = [(n, (n + first) & 1) for n in range(count)]
-    kept = pulses(edges, buckets=40)
-    assert (kept[0], kept[-1]) == (edges[0], edges[-1])
-    assert len(kept) <= 3 * 41
-    for start in range(0, count - 101, 101):
-        assert {level for at, level in kept if start <= at < start + 101} == {0, 1}

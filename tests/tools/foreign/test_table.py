@@ -195,13 +195,13 @@ def test_results_are_noted_beside_those_of_other_rows(tmp_path: Path) -> None:
     json.loads(file.read_text())
 
 
-def test_the_page_says_what_came_back_and_what_was_found() -> None:
+def test_the_page_says_how_a_row_ended_and_what_was_found() -> None:
     one = replace(row(fails), found="a register")
     page = "x\n<!-- table: foreign firmware -->\nold\n<!-- end -->\ny\n"
     made = written(page, [one], [Result("theirs", RowStatus.PASSED, "a | b", 3.2)])
-    assert "passed in 3 s: a \\| b. Found: a register" in made
-    twice = Result("theirs", RowStatus.FAILED, "late", 3.2, ("on a busy machine",), before="passed in 2 s")
-    assert "failed in 3 s, on a busy machine (before: passed in 2 s): late" in written(page, [one], [twice])
+    assert "| 3 s. Found: a register |" in made
+    late = Result("theirs", RowStatus.FAILED, "a | b", 3.2, ("on a busy machine",), before="passed in 2 s")
+    assert "| failed in 3 s: a \\| b, busy. Found: a register |" in written(page, [one], [late])
     assert "old" not in made
     assert (made[:2], made[-2:]) == ("x\n", "y\n")
     assert "| not run" in written(page, [row(fails)], [])

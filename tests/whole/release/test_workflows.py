@@ -27,7 +27,7 @@ ACTIONS = sorted((GITHUB / "actions").glob("*/action.yml"))
 BENCH = GITHUB / "actions" / "bench" / "action.yml"
 #: What each workflow of the issue is, and where it is.
 WANTED = {
-    "make lint": "tests", "make type": "tests", "make unit": "tests", "make test HOUSE": "tests", "make docs": "wheels",
+    "make lint": "tests", "make type": "tests", "make unit": "tests", "make test HOUSE": "tests", "make site": "wheels",
     "make wheels": "wheels", "make board-check": "board", "make soak": "nightly", "make foreign": "nightly",
     "make bench-history": "bench",
 }  # fmt: skip

@@ -93,8 +93,8 @@ def _aria(program: str) -> Row:
     does = "drives" if program in _ARIA_DRIVES else "opens a session"
     return Row(
         name=f"aria-{program}", kind=ProgramKind.CLIENT, source=ARIA,
-        program=f"its {program}, as its Makefile makes it",
-        said=f"{does}{f', and prints {shows}' if shows else ''}",
+        program="example",
+        said=f"{does}{f'; prints `{shows}`' if shows else ''}",
         judge=Drives(
             program=f"aria/source/*/{program}",
             commands=(("{program}", "-rh", "{host}", "-rrtp", "{port}", *_ARIA_WORDS.get(program, ())),),
@@ -107,7 +107,7 @@ def _aria(program: str) -> Row:
 
 CLIENTS: tuple[Row, ...] = (
     Row(
-        name="p2os-drive", kind=ProgramKind.CLIENT, source=OURS, program="our own client, as a measure",
+        name="p2os-drive", kind=ProgramKind.CLIENT, source=OURS, program="our own client, for comparison",
         said="drives 0.2 m/s",
         judge=Drives(
             program=sys.executable,
@@ -117,7 +117,7 @@ CLIENTS: tuple[Row, ...] = (
     *map(_aria, (*_ARIA_DRIVES, *_ARIA_TALKS)),
     Row(
         name="aria-c", kind=ProgramKind.CLIENT, source=ARIA,
-        program="its library in C, which MATLAB uses, and that library's own test", said="drives 0.2 m/s in a circle",
+        program="the test of its C library for MATLAB", said="drives 0.2 m/s in a circle",
         judge=Drives(
             program="aria/source/matlab/test", commands=(("{program}", "-rh", "{host}", "-rrtp", "{port}"),),
             serve=("--for", "aria"),
@@ -125,8 +125,8 @@ CLIENTS: tuple[Row, ...] = (
         ),
     ),
     Row(
-        name="soar", kind=ProgramKind.CLIENT, source=SOAR, program="the package in an environment py of the cache",
-        said="its robot, without its windows, is told 0.2 m/s as a brain would",
+        name="soar", kind=ProgramKind.CLIENT, source=SOAR, program="package in the environment `py` of the cache",
+        said="its robot class drives 0.2 m/s, without the windows",
         judge=Drives(
             program="py/lib/python*/site-packages/soar", serve=("--firmware", "ARCOS"),
             files=(("mover.py", _SOAR_MOVER),), commands=(("{cache}/py/bin/python", "{scratch}/mover.py"),),
@@ -134,8 +134,8 @@ CLIENTS: tuple[Row, ...] = (
     ),
     Row(
         name="player", kind=ProgramKind.CLIENT, source=PLAYER,
-        program="its server with its p2os driver, and its library in C",
-        said="its own client sets 0.2 m/s through its server",
+        program="its server with the p2os driver, and its C library",
+        said="its client sets 0.2 m/s through the server",
         judge=Drives(
             program="player/bin/player", files=(("player.cfg", _PLAYER), ("mover.py", _PLAYER_MOVER)),
             commands=(("{program}", "-p", "{free}", "{scratch}/player.cfg"), (sys.executable, "{scratch}/mover.py")),
@@ -144,20 +144,20 @@ CLIENTS: tuple[Row, ...] = (
     ),
     Row(
         name="p2os-arduino", kind=ProgramKind.CLIENT, source=ARDUINO,
-        program="its sources with an Arduino.h for this system, and a sketch that drives 0.2 m/s on the terminal named",
+        program="its sources with an Arduino.h for this system and a sketch that drives 0.2 m/s",
         said="drives",
         judge=Drives(program="p2os-arduino/drive", commands=(("{program}", "{line}"),)),
     ),
     Row(
         name="carmen", kind=ProgramKind.CLIENT, source=CARMEN,
-        program="its pioneerlib and carmenserial, with a main of three lines that sets 0.2 m/s on the terminal named",
+        program="its pioneerlib and carmenserial with a main of three lines that sets 0.2 m/s",
         said="drives",
         judge=Drives(program="carmen/drive", commands=(("{program}", "{line}"),)),
     ),
     Row(
         name="ros1", kind=ProgramKind.CLIENT, source=ROS1,
-        program="its package p2os_driver in a workspace ros-p2os/devel, ROS 1 from Debian",
-        said="the node drives what rostopic publishes on /cmd_vel",
+        program="p2os_driver in a workspace ros-p2os/devel, ROS 1 from Debian",
+        said="drives what rostopic publishes on /cmd_vel",
         judge=Drives(
             program="ros-p2os/devel/lib/p2os_driver/p2os_driver", killed=1, commands=(
                 ("roscore", "-p", "{free}"),

@@ -144,7 +144,7 @@ INSTRUMENTS = (
         Row(
             name=f"grbl-{port}", kind=ProgramKind.FIRMWARE, source=GRBL,
             program=f"grbl 1.1f for an STM32F103, {words}",
-            said="grbl-streamer (PyPI) resets it, unlocks it and streams a job: every step counted, idle at the end",
+            said="grbl-streamer (PyPI) resets, unlocks and streams a job; steps are counted, idle at the end",
             judge=Hosted(
                 image=f"grbl/grbl-{port}.elf", port="usart1" if port == "usart" else port,
                 host_needs=(f"{_PACKAGE}grbl_streamer",),
@@ -158,20 +158,20 @@ INSTRUMENTS = (
     ),
     Row(
         name="baseflight-msp", kind=ProgramKind.FIRMWARE, source=BASEFLIGHT,
-        program="Baseflight, target NAZE, with an MPU-6050 at I2C2; what it drives is at TIM1 and TIM4",
-        said="MSP: identity, IMU, motors set and read back, and their pulses at the pins",
+        program="Baseflight, target NAZE, MPU-6050 at I2C2, motors at TIM1 and TIM4",
+        said="MSP: identity, IMU, motors set and read back",
         judge=Hosted(
             image="baseflight/source/obj/baseflight_NAZE.elf", host_needs=(f"{_PACKAGE}serial",),
             attach=("mpu6050,on=I2C2",), files=(("msp.py", _MSP),),
             hosts=((_PYTHON, "{scratch}/msp.py", "{line}"),),
             hears=(r"IDENT (version \d+ type \d+)", r"IMU (\[[^]]*\])", r"MOTORS (\[1200, 1300, 1400, 1500\])"),
         ),
-        found="the MPU-6050's registers of its revision",
+        found="the MPU-6050's revision registers",
     ),
     Row(
         name="modbus", kind=ProgramKind.FIRMWARE, source=MODBUS,
-        program="a server on its library: RTU, unit 17, USART1 at 19200, 32 registers and coils, an exception beyond",
-        said="pymodbus (PyPI) writes and reads back registers and coils, and reads beyond them",
+        program="an RTU server on its library: unit 17, USART1 at 19200, 32 registers and coils",
+        said="pymodbus (PyPI) writes and reads back registers and coils; beyond them, exception 2",
         judge=Hosted(
             image="nanomodbus/server.elf", host_needs=(f"{_PACKAGE}pymodbus",),
             files=(("client.py", _REGISTERS),), hosts=((_PYTHON, "{scratch}/client.py", "{line}"),),
@@ -180,9 +180,8 @@ INSTRUMENTS = (
     ),
     Row(
         name="firmata", kind=ProgramKind.FIRMWARE, source=P2IM,
-        program="P2IM's image Gateway, StandardFirmata on stm32duino, as it is: USART2 at 57600",
-        said="pyfirmata2 (PyPI) asks for its version and sets pin 13 three times: PA5 rises so often, and 2 and 5 "
-        "times before, as the sketch blinks its version",
+        program="P2IM's image Gateway: StandardFirmata on stm32duino, USART2 at 57600",
+        said="pyfirmata2 (PyPI) reads the version and sets pin 13; PA5 rises 2, 5 (the version) and 3 times",
         judge=Hosted(
             image="fuzzware-experiments/source/02-comparison-with-state-of-the-art/P2IM/Gateway/Gateway.elf",
             port="usart2", host_needs=(f"{_PACKAGE}pyfirmata2",),
@@ -192,9 +191,9 @@ INSTRUMENTS = (
     ),
     Row(
         name="openblt", kind=ProgramKind.FIRMWARE, source=OPENBLT,
-        program="its demo ARMCM3_STM32F1_Nucleo_F103RB_GCC as it is, the S-records as Intel HEX; USART2 at 57600; its "
-        "own host BootCommander, without its call that raises DTR, which a pseudo-terminal has not",
-        said="BootCommander erases, programs and starts the demo program, whose LED at PA5 then blinks",
+        # As Intel HEX of its S-records; BootCommander without its call that raises DTR, which pseudo-terminals lack.
+        program="its demo ARMCM3_STM32F1_Nucleo_F103RB_GCC, USART2 at 57600; BootCommander built without DTR",
+        said="BootCommander erases, programs and starts the demo program; its LED at PA5 blinks",
         judge=Hosted(
             image="openblt/openblt.hex", port="usart2", host_needs=("openblt/source/Host/BootCommander",),
             hosts=((
@@ -211,8 +210,8 @@ INSTRUMENTS = (
     ),
     Row(
         name="arduino-adc", kind=ProgramKind.FIRMWARE, source=P2IM,
-        program="Arduino's image ARDUINO-F103-ADC, as it is",
-        said="half the supply at its input, which it prints as 2.50 of 5 V on USART2 at 9600",
+        program="Arduino's image ARDUINO-F103-ADC",
+        said="half the supply at its input is printed as 2.50 of 5 V on USART2",
         judge=Dialogue(
             image="fuzzware-experiments/source/01-access-modeling-for-fuzzing/p2im-unittests/F103/ARDUINO-F103-ADC/"
             "ARDUINO-F103-ADC.elf",

@@ -52,9 +52,8 @@ while True:
 MODELS: tuple[Row, ...] = (
     Row(
         name="aria-models", kind=ProgramKind.CLIENT, source=ARIA,
-        program="its library in C and that library's own test, which prints where the robot is",
-        said="every model of its params/ that p2os serve has, with the packets of P2OS, AROS and ARCOS: its poses lie "
-        "on the robot's way, and it hears every sonar",
+        program="the test of its C library, which prints poses",
+        said="each model of its params/, with P2OS, AROS and ARCOS packets: right poses, every sonar received",
         judge=Poses(
             program="aria/source/matlab/test", knows="aria/source/params/*.p",
             commands=(("stdbuf", "-oL", "{program}", "-rh", "{host}", "-rrtp", "{port}"),),
@@ -64,13 +63,12 @@ MODELS: tuple[Row, ...] = (
             client="aria",  # else it looks for the batteries of a Pioneer LX on lines of their own
         ),
         needs=("stdbuf",), limit_s=1800.0,
-        found="headings of a Pioneer 1 in 4096 counts a turn, not 1024",
+        found="Pioneer 1 headings had 4096 counts a turn, not 1024",
     ),
     Row(
         name="player-models", kind=ProgramKind.CLIENT, source=PLAYER,
-        program="its server with its p2os driver, its library in C, and its source",
-        said="every model of its robot_params.cc that p2os serve has, with the packets of P2OS, AROS and ARCOS: its "
-        "poses lie on the robot's way, and it hears every sonar",
+        program="its server with the p2os driver, C library and sources",
+        said="each model of its robot_params.cc, with P2OS, AROS and ARCOS packets: right poses, every sonar received",
         judge=Poses(
             program="player/bin/player", knows="player/source/server/drivers/mixed/p2os/robot_params.cc",
             model=r'"([^"]+)", // Subclass', files=(("player.cfg", _PLAYER), ("poses.py", _PLAYER_POSES)),

@@ -128,12 +128,12 @@ def _klippy(port: str, mcu: str, hosts: tuple[tuple[str, ...], ...], needs: tupl
     )
 
 
-_KLIPPY_SAID = "its stock host homes three axes at their switches, then moves 40, 20 and 10 mm: every step counted"
+_KLIPPY_SAID = "its stock host homes three axes at switches, then moves 40, 20 and 10 mm; steps are counted"
 
 PRINTERS = (
     Row(
         name="klippy-usart", kind=ProgramKind.FIRMWARE, source=KLIPPER, said=_KLIPPY_SAID,
-        program="Klipper for an STM32F103, 8 MHz crystal, serial port USART1 on PA10/PA9",
+        program="Klipper for an STM32F103, 8 MHz crystal, USART1 on PA10/PA9",
         judge=_klippy("usart", "serial: {line}", ()),
     ),
     Row(
@@ -143,7 +143,7 @@ PRINTERS = (
         found="double-buffered endpoints: it was dead over USB",
     ),
     Row(
-        name="klippy-can", kind=ProgramKind.FIRMWARE, source=KLIPPER, said="its query finds it by CAN; then the same",
+        name="klippy-can", kind=ProgramKind.FIRMWARE, source=KLIPPER, said="the query finds it on CAN; then as above",
         program="Klipper for an STM32F103, 8 MHz crystal, CAN on PB8/PB9 at 1 Mbit/s",
         judge=_klippy(
             "can", "canbus_uuid: 8c9fbe56ebe7",

@@ -19,13 +19,9 @@ VISITOR = "visitor"
 STACKS: tuple[Row, ...] = (
     Row(
         name="ros2-karto-navfn", kind=ProgramKind.STACK, source=KARTO,
-        program="Karto as a library, its loop closing off as it has no solver here, karto/karto.so, and navfn.cpp of "
-        "nav2_navfn_planner (navigation2 f4108e5b1c) as navfn/navfn.so, each with functions in C before it, as "
-        "tools/foreign/nodes says; in ros2/env rclpy and rmw_fastrtps of Jazzy (PyPI, ros-jazzy-…) and tf2_msgs of "
-        "geometry2 646342c616",
-        said="two nodes of ours on stock rclpy, one around each, beside p2os ros: office without its visitor is mapped "
-        "on the way to 20 goals, with the errors of realistic sensors; judged by the body's true pose, its contacts, "
-        "and where things stand",
+        # karto/karto.so and navfn/navfn.so, each behind functions in C (tools/foreign/nodes), on ROS 2 Jazzy.
+        program="Karto and Nav2's navfn planner as libraries, in nodes of ours on stock rclpy",
+        said="maps office on the way to 20 goals with realistic errors; judged by true pose, contacts and obstacles",
         judge=Navigates(
             python="ros2/env/bin/python",
             programs=("karto/karto.so", "navfn/navfn.so", "ros2/env/lib/libtf2_msgs*fastrtps_c.so"),

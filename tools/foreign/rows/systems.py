@@ -38,8 +38,8 @@ _START = (Exchange(hear=rb"Press s to start"), Exchange(say=b"s\n", hear=rb"STAR
 def _riot(name: str, *steps: Exchange) -> Row:
     return Row(
         name=f"riot-{name.replace('_', '-')}", kind=ProgramKind.FIRMWARE, source=RIOT,
-        program=f"RIOT's own test {name} for board bluepill-stm32f103c8, which prints on USART1",
-        said="what RIOT's script expects of that test",
+        program=f"its test {name} for bluepill-stm32f103c8, USART1",
+        said="what the test's own script expects",
         judge=Dialogue(image=f"riot/tests_{name}.elf", steps=(*_START, *steps)),
     )  # fmt: skip
 
@@ -47,8 +47,8 @@ def _riot(name: str, *steps: Exchange) -> Row:
 SYSTEMS = (
     Row(
         name="coremark", kind=ProgramKind.FIRMWARE, source=COREMARK,
-        program="CoreMark, performance run, 1500 iterations at 72 MHz, timed by SysTick, printed on USART1",
-        said="the CRCs of EEMBC's table for this run, and its own verdict",
+        program="performance run, 1500 iterations at 72 MHz, timed by SysTick, USART1",
+        said="EEMBC's CRCs for this run, and its own verdict",
         judge=Dialogue(
             image="coremark/coremark.elf",
             steps=(
@@ -60,9 +60,9 @@ SYSTEMS = (
     ),
     Row(
         name="freertos", kind=ProgramKind.FIRMWARE, source=FREERTOS,
-        program="its kernel, port ARM_CM3, tick of 1 kHz at 72 MHz: a producer every 10 ticks, a consumer by queue, "
-        "two tasks that share a mutex, a timer of 50 ticks; printed on USART1",
-        said="5050 by queue in exactly 1000 ticks, 20 timers, 4000 turns under the mutex",
+        # Tick of 1 kHz at 72 MHz: a producer every 10 ticks, a consumer, two tasks that share a mutex, a timer of 50.
+        program="kernel, port ARM_CM3, 1 kHz tick: queue, mutex, timer; USART1",
+        said="5050 by queue in exactly 1000 ticks, 20 timer events, 4000 turns under the mutex",
         judge=Dialogue(
             image="freertos/tasks.elf",
             steps=(Exchange(hear=rb"sum 5050 ticks 1000 fired 20 shared 4000", within="3 s"),),
@@ -70,8 +70,8 @@ SYSTEMS = (
     ),
     Row(
         name="chibios", kind=ProgramKind.FIRMWARE, source=CHIBIOS,
-        program="its demo RT-STM32F103-OLIMEX_STM32_P103 as it is: button PA0, USART2 at 38400",
-        said="the button begins its own suites of the kernel and of its library: both must end in SUCCESS",
+        program="its demo RT-STM32F103-OLIMEX_STM32_P103: button PA0, USART2 at 38400",
+        said="the button starts its kernel and library test suites; both end in SUCCESS",
         judge=Dialogue(
             image="chibios/source/demos/STM32/RT-STM32F103-OLIMEX_STM32_P103/build/ch.elf", port="usart2",
             baud=38400, drive=(("PA0", 1),),
@@ -83,8 +83,8 @@ SYSTEMS = (
     ),
     Row(
         name="mecrisp", kind=ProgramKind.FIRMWARE, source=MECRISP,
-        program="its precompiled Forth for the STM32F103, USART1 at 115200",
-        said="arithmetic, a word that is compiled into RAM, and one into flash that is there after a reset",
+        program="precompiled Forth for the STM32F103, USART1 at 115200",
+        said="arithmetic, a word compiled into RAM, and one into flash that survives a reset",
         judge=Dialogue(
             image="mecrisp/source/stm32f103/precompiled/mecrisp-stellaris-stm32f103-with-disassembler-m3.hex",
             steps=(
@@ -97,12 +97,12 @@ SYSTEMS = (
                 Exchange(pause="50 ms", say=b"11 cube .\r", hear=rb"\. 1331  ok\."),
             ),
         ),
-        found="what stands behind the store that asks for a reset was reported as a fault",
+        found="code behind a reset request was reported as a fault",
     ),
     Row(
         name="nuttx-usart", kind=ProgramKind.FIRMWARE, source=P2IM,
-        program="NuttX with P2IM's program that reads ttyS0, as it is",
-        said="it starts its application and gives back what it is sent",
+        program="NuttX with P2IM's program that reads ttyS0",
+        said="starts its application and echoes its input",
         judge=Dialogue(
             image=_unit("NUTTX-USART"),
             steps=(
@@ -112,8 +112,8 @@ SYSTEMS = (
         ),
     ),
     Row(
-        name="nuttx-adc", kind=ProgramKind.FIRMWARE, source=P2IM, program="NuttX with its example adc, as it is",
-        said="its samples of the ADC, with half the supply at every input of the port",
+        name="nuttx-adc", kind=ProgramKind.FIRMWARE, source=P2IM, program="NuttX with its example adc",
+        said="samples the ADC with half the supply at every input",
         judge=Dialogue(
             image=_unit("NUTTX-F103-ADC"),
             volts=tuple((f"P{port}{number}", 1.65) for port in "AB" for number in (0, 1)),
@@ -121,8 +121,8 @@ SYSTEMS = (
         ),
     ),
     Row(
-        name="nuttx-pwm", kind=ProgramKind.FIRMWARE, source=P2IM, program="NuttX with its example pwm, as it is",
-        said="the output of 100 Hz that it tells of, and its end",
+        name="nuttx-pwm", kind=ProgramKind.FIRMWARE, source=P2IM, program="NuttX with its example pwm",
+        said="reports its 100 Hz output and its end",
         judge=Dialogue(
             image=_unit("NUTTX-PWM"),
             steps=(
@@ -134,8 +134,8 @@ SYSTEMS = (
     _riot("mutex_order", Exchange(hear=rb"T\d+ \(prio 1\): locked mutex now", within="5 s")),
     Row(
         name="nuttx-nsh", kind=ProgramKind.FIRMWARE, source=NUTTX,
-        program="its configuration stm32f103-minimum:nsh with nuttx-apps, console on USART1 at 115200",
-        said="its shell: what it is, its devices, and two seconds that take two seconds",
+        program="stm32f103-minimum:nsh with nuttx-apps, USART1 at 115200",
+        said="shell: identity, devices, and a sleep of two seconds that takes two",
         judge=Dialogue(
             image="nuttx/source/nuttx",
             steps=(

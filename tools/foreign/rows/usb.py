@@ -35,7 +35,7 @@ SERPROG = Source(
     commit="c74b4ed5704907f56e6ed1fa59d1874fd8de1bda",
 )  # fmt: skip
 _EXAMPLE = "tinyusb/source/examples/device/{0}/_build/stm32f103_bluepill/{0}.elf"
-_BOARD = "its example {} for board stm32f103_bluepill"
+_BOARD = "example {} for stm32f103_bluepill"
 _SECTOR = 512
 
 
@@ -171,8 +171,8 @@ _FLASHROM = ("flashrom", "-p", "serprog:dev={line}:4000000")
 
 USB = (
     Row(
-        name="cdc-echo", kind=ProgramKind.FIRMWARE, source=EXAMPLES, program="its example f1/stm32-h103/usb_cdcacm",
-        said="what is sent comes back",
+        name="cdc-echo", kind=ProgramKind.FIRMWARE, source=EXAMPLES, program="example f1/stm32-h103/usb_cdcacm",
+        said="echoes its input",
         judge=Dialogue(
             image="libopencm3-examples/source/examples/stm32/f1/stm32-h103/usb_cdcacm/cdcacm.elf", port="usb",
             steps=(Exchange(say=b"echo of 21 bytes, two", hear=rb"echo of 21 bytes, two"),
@@ -181,17 +181,17 @@ USB = (
     ),
     Row(
         name="tinyusb-cdc", kind=ProgramKind.FIRMWARE, source=TINYUSB, program=_BOARD.format("cdc_dual_ports"),
-        said="what port 0 is sent comes back at both ports, in small letters and in capitals",
+        said="echoes port 0 at both ports, in lower and upper case",
         judge=Scripted(image=_EXAMPLE.format("cdc_dual_ports"), script=_ports),
     ),
     Row(
         name="tinyusb-disk", kind=ProgramKind.FIRMWARE, source=TINYUSB, program=_BOARD.format("cdc_msc"),
-        said="INQUIRY, READ CAPACITY, every sector, a sector written and read back",
+        said="INQUIRY, READ CAPACITY, every sector; one written and read back",
         judge=Scripted(image=_EXAMPLE.format("cdc_msc"), script=_disk),
     ),
     Row(
         name="tinyusb-hid", kind=ProgramKind.FIRMWARE, source=TINYUSB, program=_BOARD.format("hid_generic_inout"),
-        said="each report comes back", judge=Scripted(image=_EXAMPLE.format("hid_generic_inout"), script=_reports),
+        said="echoes each report", judge=Scripted(image=_EXAMPLE.format("hid_generic_inout"), script=_reports),
     ),
     Row(
         name="tinyusb-dfu", kind=ProgramKind.FIRMWARE, source=TINYUSB, program=_BOARD.format("dfu"),
@@ -199,16 +199,16 @@ USB = (
         judge=Scripted(image=_EXAMPLE.format("dfu"), script=_partitions),
     ),
     Row(
-        name="dfuse", kind=ProgramKind.FIRMWARE, source=EXAMPLES, program="its example f1/stm32-h103/usb_dfu",
-        said="erase, address, a program, leave: the program must run",
+        name="dfuse", kind=ProgramKind.FIRMWARE, source=EXAMPLES, program="example f1/stm32-h103/usb_dfu",
+        said="erase, set the address, program, leave; the program runs",
         judge=Scripted(
             image="libopencm3-examples/source/examples/stm32/f1/stm32-h103/usb_dfu/usbdfu.elf", script=_dfuse
         ),
     ),
     *(
         Row(
-            name=name, kind=ProgramKind.FIRMWARE, source=MAPLE, program=f"its binary {file}, as it is",
-            said="DFU 1.1 to alternate setting 2: the program that was flashed must run",
+            name=name, kind=ProgramKind.FIRMWARE, source=MAPLE, program=f"its binary {file}",
+            said="DFU 1.1 to alternate setting 2; the flashed program runs",
             judge=Scripted(
                 image=f"stm32duino-bootloader/source/bootloader_only_binaries/{file}", script=_stm32duino
             ),
@@ -219,18 +219,17 @@ USB = (
     ),
     Row(
         name="cmsis-dap", kind=ProgramKind.FIRMWARE, source=DAP, program="target STM32F103-BLUEPILL",
-        said="DAP_Info, DAP_Connect, a transfer on wires where nobody is",
+        said="DAP_Info, DAP_Connect, a transfer without a target",
         judge=Scripted(image="dap42/source/src/DAP42.elf", script=_cmsis_dap),
     ),
     Row(
-        name="usb-bridge", kind=ProgramKind.FIRMWARE, source=MONSTER, program="as its Makefile makes it",
-        said="bytes from USB to a UART and back",
+        name="usb-bridge", kind=ProgramKind.FIRMWARE, source=MONSTER, program="its Makefile's build",
+        said="passes bytes from USB to a UART and back",
         judge=Scripted(image="bluepill-serial-monster/source/bluepill-serial-monster.elf", script=_bridge),
     ),
     Row(
         name="blackmagic-gdb", kind=ProgramKind.FIRMWARE, source=PROBE, program="platform swlink, at 0x08000000",
-        said="GDB asks its GDB server over USB for its version, and has it look for a target at its wires: none"
-        " is there",
+        said="GDB reads the version over USB and scans for a target; none is there",
         judge=Hosted(
             image="blackmagic/source/src/blackmagic.elf", port="usb", host_needs=("gdb-multiarch",),
             hosts=((
@@ -244,8 +243,8 @@ USB = (
     ),
     Row(
         name="flashrom", kind=ProgramKind.FIRMWARE, source=SERPROG,
-        program="board stm32-bluepill, with a W25Q16 at SPI1",
-        said="flashrom finds the chip, erases and writes 32 KiB of it, verifies, and once more in a run of its own",
+        program="board stm32-bluepill, W25Q16 at SPI1",
+        said="flashrom finds the chip, erases and writes 32 KiB, verifies; a second run verifies again",
         judge=Hosted(
             image="stm32-vserprog/source/stm32-vserprog.elf", port="usb", host_needs=("flashrom",),
             attach=("w25q16,on=SPI1,select=PA4",),

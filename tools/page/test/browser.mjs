@@ -70,6 +70,15 @@ await page.getByRole("searchbox", { name: /Filter packets/ }).fill("");
 for (const tab of found.tabs) await page.getByRole("tab", { name: tab, exact: true }).click();
 await page.getByRole("tab", { name: "3D" }).click();
 await page.waitForFunction(() => document.querySelector(".view-scene canvas") !== null, undefined, { timeout: 20000 }).catch(() => found.errors.push(`3D: no canvas`));
+// Which lines have run by the page's time, before and after the second one has.
+found.lines = [];
+await page.getByRole("tab", { name: "Program", exact: true }).click();
+for (const at of [999_999_999, 1_000_000_000]) {
+  await page.evaluate((t) => window.p2osPage.app.clock.seek(t), at);
+  await page.waitForTimeout(50);
+  found.lines.push(await page.locator(".view-panel-program li").evaluateAll((all) => all.map((one) => one.className).join(" ")));
+}
+
 found.help = await (async () => {
   await page.getByRole("button", { name: "Keys and views" }).click();
   const text = await page.getByRole("dialog").textContent();

@@ -50,8 +50,12 @@ await page.getByRole("combobox", { name: "Chip: what is looked at" }).selectOpti
 await page.waitForFunction(() => document.querySelector(".view-panel-chip h2")?.textContent === "USART1", undefined, LONG);
 found.registers = await page.locator(".view-panel-chip tbody tr").allTextContents();
 await tab("Program");
-await page.locator(".view-panel-program pre").waitFor();
+await page.locator(".view-panel-program .source .next").waitFor();
 found.program = await page.locator(".view-panel-program").textContent();
+await page.getByRole("combobox", { name: "Program: what is looked at" }).selectOption("what has run");
+await page.locator(".view-panel-program table").waitFor();
+found.shares = await page.locator(".view-panel-program tbody tr").allTextContents();
+found.lines = await page.locator(".view-panel-program .source li").evaluateAll((all) => ["ran", "not", "part"].map((kind) => all.filter((one) => one.classList.contains(kind)).length));
 await tab("Board");
 found.board = await page.locator(".view-panel-board svg").getAttribute("aria-label");
 found.at = await page.evaluate(() => [...window.p2osPage.app.store.panels.value.values()].map(({ at_ns }) => at_ns));

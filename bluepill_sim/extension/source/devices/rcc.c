@@ -132,10 +132,6 @@ static void event(struct device *device, uint64_t ns)
 {
     struct rcc *rcc = device->state;
     uint32_t *words = device->words;
-    if (rcc->python_ns <= ns) {
-        leave_ahead(device->fabric);
-        device->fabric->calls.event(device->slot, ns);
-    }
     for (uint32_t n = 0; n < OSCILLATORS; ++n) {
         if (rcc->ready_at[n] <= ns) {
             words[oscillators[n].index] |= oscillators[n].ready;
@@ -144,6 +140,10 @@ static void event(struct device *device, uint64_t ns)
             settle(device);
             update_irq(device);
         }
+    }
+    if (rcc->python_ns <= ns) { /* last: then nothing of it is due any more */
+        leave_ahead(device->fabric);
+        device->fabric->calls.event(device->slot, ns);
     }
     schedule_next(device);
 }

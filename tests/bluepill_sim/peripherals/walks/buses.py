@@ -1,5 +1,7 @@
 """Walks of what talks to others: USART, SPI, I2C, CAN, USB."""
 
+import zlib
+
 from bluepill_sim.fabric.usb_bus import BusState, Handshake, Token, Transaction
 from bluepill_sim.parts import CanFrame
 from bluepill_sim.peripherals.usart import ReceiveError
@@ -9,13 +11,14 @@ from tests.bluepill_sim.peripherals.walks.walker import BUFFER, RegisterWalk, Re
 _PUSH, _OPEN = 0xBBBB_BBBB, 0xFFFF_FFFF
 
 
-def _pins(w: RegisterWalker, mode: int = _PUSH, *, inputs: str = "") -> None:
-    """Give all pins of A and B to the peripherals, but some that are inputs, "A3 A10"."""
+def _pins(w: RegisterWalker, mode: int = _PUSH, *, inputs: str = "", analog: str = "") -> None:
+    """Give all pins of A and B to the peripherals, but some that are inputs, "A3 A10", and some that are analog."""
     words = {f"GPIO{port}.CR{half}": mode for port in "AB" for half in "LH"}
-    for pin in inputs.split():
-        number = int(pin[1:])
-        name = f"GPIO{pin[0]}.CR{'LH'[number > 7]}"
-        words[name] = words[name] & ~(0xF << number % 8 * 4) | 0x4 << number % 8 * 4
+    for pins, setting in ((inputs, 0x4), (analog, 0)):
+        for pin in pins.split():
+            number = int(pin[1:])
+            name = f"GPIO{pin[0]}.CR{'LH'[number > 7]}"
+            words[name] = words[name] & ~(0xF << number % 8 * 4) | setting << number % 8 * 4
     for name, word in words.items():
         w.write(name, word)
 
@@ -49,14 +52,14 @@ _USART_MODES = (
 _USART_DMA = {1: (4, 5), 2: (7, 6), 3: (2, 3)}
 
 
-def _usart(number: int) -> RegisterWalk:
+def _usart(number: int) -> RegisterWalk:  # noqa: C901 - a function a move
     name = f"USART{number}"
     inputs = {1: "A10 A11", 2: "A3 A0", 3: "B11 B13"}[number]
     cts = {1: "PA11", 2: "PA0", 3: "PB13"}[number]
 
     def begin(w: RegisterWalker) -> None:
-        _pins(w, inputs=inputs)
-        two, three, more_two, more_three = w.pick(_USART_MODES)
+        _pins(w, inputs=inputs, analog="" if w.number(8) else inputs)
+        two, three, more_two, more_three = w.turn_of(_USART_MODES)
         w.write(f"{name}.BRR", w.pick((16, 17, 24, 40, 69)))
         w.write(f"{name}.GTPR", w.pick((0, 1, 2, 0x101, 0x1005)))
         w.write(f"{name}.CR2", two | w.some(*more_two))
@@ -78,13 +81,16 @@ def _usart(number: int) -> RegisterWalk:
 
     def hear(w: RegisterWalker) -> None:
         data = [w.pick((0, 5, 0x55, 0x85, 0xFF, 0x105, w.number(512))) for _ in range(1 + w.number(3))]
+        data *= w.pick((1, 1, 1, 1, 1, 60))
         damage = ReceiveError(w.some(*ReceiveError)) if not w.number(3) else ReceiveError(0)
         w.note(f"hears {data} {damage.value}")
         w.part(name).receive(data, damage)
 
     def hear_break(w: RegisterWalker) -> None:
-        w.note("hears a break")
-        w.part(name).receive_break(11 + w.number(4))
+        bits = 8 + w.number(7)
+        w.note(f"hears a break of {bits}")
+        w.attempt(lambda: w.part(name).receive_break(bits))
+        w.note(f"{w.part(name).bit_ns}")
 
     def hold(w: RegisterWalker) -> None:
         w.drive(cts, w.pick((False, True, None)))
@@ -92,16 +98,26 @@ def _usart(number: int) -> RegisterWalk:
     def control(w: RegisterWalker) -> None:
         w.turn(f"{name}.CR1", on=w.some(_SBK, _RWU), off=w.pick((0, 0, _TE, _RE, _RWU)))
 
+    def cut(w: RegisterWalker) -> None:
+        """Turn off what is under way."""
+        w.write(f"{name}.DR", w.number(256))
+        w.part(name).receive([0x55, 0x56])
+        w.run(w.pick((3_000, 9_000, 20_000)))
+        w.turn(f"{name}.CR1", off=w.pick((_TE, _RE, _TE | _RE, _UE)))
+        w.run(w.pick((9_000, 43_000, 86_000)))
+        w.turn(f"{name}.CR1", on=_UE | _TE | _RE)
+
     return RegisterWalk(
         name=name, parts=(name, "DMA1") if number == 1 else (name,), begin=begin,
-        moves=(send, send, send, take, take, hear, hear, hear_break, hold, control),
-        spans_ns=(125, 900, 2_000, 9_000, 21_500, 43_000, 86_250, 200_000), episodes=26 if number == 1 else 9,
+        remaps=((4,), (8,), (0x10, 0x30))[number - 1],
+        moves=(send, send, send, take, take, hear, hear, hear_break, hold, control, cut),
+        spans_ns=(125, 900, 2_000, 9_000, 21_500, 43_000, 86_250, 200_000), episodes=31 if number == 1 else 11,
     )  # fmt: skip
 
 
 # SPI.
 
-_SPI_PINS = {1: ("PA4", "PA5", "PA7"), 2: ("PB12", "PB13", "PB15")}
+_SPI_PINS = {1: ("PA4", "PA5", "PA7", "PA6"), 2: ("PB12", "PB13", "PB15", "PB14")}
 _MSTR, _SPE, _LSBFIRST, _SSI, _SSM, _RXONLY, _DFF, _CRCNEXT, _CRCEN, _BIDIOE, _BIDIMODE = (
     1 << n for n in (2, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
 )
@@ -112,20 +128,22 @@ _SPI_MODES = (
 )  # fmt: skip
 
 
-def _spi(number: int) -> RegisterWalk:  # noqa: C901 - a function a move
+def _spi(number: int) -> RegisterWalk:  # noqa: C901, PLR0915 - a function a move
     name = f"SPI{number}"
-    nss, sck, mosi = _SPI_PINS[number]
+    nss, sck, mosi, miso = _SPI_PINS[number]
 
     def begin(w: RegisterWalker) -> None:
-        mode = w.pick(_SPI_MODES)
-        _pins(w, inputs="" if mode & _MSTR else f"{nss[1:]} {sck[1:]} {mosi[1:]}")
+        mode = w.turn_of(_SPI_MODES)
+        lost = w.pick((*("",) * 8, sck[1:], mosi[1:], miso[1:]))
+        inputs = lost + f" {nss[1:]}" * (not mode & _SSM) if mode & _MSTR else f"{nss[1:]} {sck[1:]} {mosi[1:]}"
+        _pins(w, inputs=inputs, analog=lost * w.number(2))
         w.write("GPIOB.CRL", 0xBBBB_BBB3)
         w.write("GPIOB.BSRR", w.pick((1, 1 << 16)))
         if not mode & (_MSTR | _SSM):
             w.drive(nss, w.pick((False, False, True)))
         w.write(f"{name}.CRCPR", w.pick((7, 0x1021, 0x31)))
         w.write(f"{name}.CR2", w.some(1, 2, 4, 32, 64, 128))
-        settings = mode | w.some(1, 2, _LSBFIRST, _DFF) | w.number(4) << 3
+        settings = mode | w.pick((0, 0, 0, _LSBFIRST, _DFF, _LSBFIRST | _DFF)) | w.pick((0, 3, 1, 2)) | w.number(4) << 3
         w.write(f"{name}.CR1", settings)
         if w.look(f"{name}.CR2") & 3 and number == 1:
             _dma(w, 3, w.part(name).base + 12, to_memory=False, wide=0x100 if settings & _DFF else 0)
@@ -149,7 +167,8 @@ def _spi(number: int) -> RegisterWalk:  # noqa: C901 - a function a move
     def clock_in(w: RegisterWalker) -> None:
         words = [w.number(0x10000 if w.look(f"{name}.CR1") & _DFF else 0x100) for _ in range(1 + w.number(3))]
         w.note(f"is clocked {words}")
-        w.part(name).clock_in(words, w.pick((100_000, 500_000, 1_000_000)))
+        hz = w.pick((100_000, 500_000, 1_000_000, 0, 1))
+        w.attempt(lambda: w.part(name).clock_in(words, hz))
 
     def checked(w: RegisterWalker) -> None:
         """A word and its CRC."""
@@ -174,9 +193,9 @@ def _spi(number: int) -> RegisterWalk:  # noqa: C901 - a function a move
         w.write("GPIOB.BSRR", w.pick((1, 1 << 16)))
 
     return RegisterWalk(
-        name=name, parts=(name, "DMA1") if number == 1 else (name,), begin=begin,
+        name=name, parts=(name, "DMA1") if number == 1 else (name,), begin=begin, remaps=(1,) * (number == 1),
         moves=(send, send, send_many, take, take, clock_in, wires, control, checked),
-        spans_ns=(125, 250, 1_000, 2_000, 4_500, 9_000, 33_000), episodes=26 if number == 1 else 10,
+        spans_ns=(125, 250, 1_000, 2_000, 4_500, 9_000, 33_000), episodes=34 if number == 1 else 12,
     )  # fmt: skip
 
 
@@ -199,7 +218,9 @@ def _i2c(number: int) -> RegisterWalk:  # noqa: C901, PLR0915 - a function a mov
         w.write(f"{name}.TRISE", w.pick((2, 3, 9)))
         w.write(f"{name}.OAR1", w.pick((0x60, 0x4060, 0xC123)))
         w.write(f"{name}.OAR2", w.pick((0, 0x63)))
-        w.write(f"{name}.CR1", _PE | w.some(_ACK, _ACK, _ENPEC, _ENGC, _NOSTRETCH, 2, 8, 16, _POS))
+        w.write(
+            f"{name}.CR1", _PE | w.some(_ACK, _ACK, _ENPEC, _ENGC, _NOSTRETCH, 16, _POS) | w.turn_of((0, 0, 2, 10, 8))
+        )
         w.turn(f"{name}.CR1", on=w.pick((_ACK, _ACK, _ACK, 0)))
         if not w.number(3):
             w.turn(f"{name}.CR2", on=1 << 11 | w.some(1 << 12))
@@ -239,10 +260,13 @@ def _i2c(number: int) -> RegisterWalk:  # noqa: C901, PLR0915 - a function a mov
         w.turn(f"{name}.CR1", off=w.pick((0, _PE, 0)), on=w.pick((_ACK, _PE | _ACK)))
 
     def called(w: RegisterWalker) -> None:
-        address = w.pick((0x30, 0x30, 0x30, 0x31, 0x123, 0, 0x44))
+        address = w.pick((0x30, 0x30, 0x30, 0x31, 0x123, 0, 0x44, 0x50, 0x2A5, 0xC, 8, 0x3FF, 0x400))
         data, count = bytes(w.number(256) for _ in range(w.number(4))), w.number(4)
         w.note(f"is called {address:#x} {data.hex()} {count}")
-        w.part(name).call(address, data, count, hz=w.pick((100_000, 400_000)))
+        if not address:
+            w.turn(f"{name}.CR1", on=_ENGC | _ACK)
+        hz = w.pick((100_000,) * 4 + (400_000,) * 4 + (0, 1_000))
+        w.attempt(lambda: w.part(name).call(address, data, count, hz=hz))
 
     def wires(w: RegisterWalker) -> None:
         """Levels from outside: a START, a STOP, a clock that is held, an alert."""
@@ -250,7 +274,7 @@ def _i2c(number: int) -> RegisterWalk:  # noqa: C901, PLR0915 - a function a mov
                         (sda, False, scl, False, sda, None, scl, None), (scl, None, sda, None)))  # fmt: skip
         for pin, level in zip(moves[::2], moves[1::2], strict=True):
             w.drive(str(pin), level if isinstance(level, bool) else None)
-            w.run(w.pick((3_000, 12_000)))
+            w.run(w.pick((125, 3_000, 12_000, 90_000)))
 
     def checked(w: RegisterWalker) -> None:
         """The packet's error code, as the last byte."""
@@ -259,13 +283,23 @@ def _i2c(number: int) -> RegisterWalk:  # noqa: C901, PLR0915 - a function a mov
         w.turn(f"{name}.CR1", on=w.some(_STOP))
         w.read(f"{name}.DR")
 
+    def unheeded(w: RegisterWalker) -> None:
+        """It is called, and no program does anything; as SMBus's host it may be alerted."""
+        w.turn(f"{name}.CR1", on=_PE | _ACK | w.pick((_NOSTRETCH, 10, 0)))
+        w.drive(smba, w.pick((True, False)))
+        if w.number(2):
+            w.part(name).call(0x30, bytes(w.number(256) for _ in range(w.number(5))), w.number(4))
+        w.run(w.pick((300_000, 600_000)))
+        w.drive(smba, False)
+        w.turn(f"{name}.CR1", on=_STOP * w.number(2))
+
     def disturbed(w: RegisterWalker) -> None:
         w.note("is disturbed")
         w.pick((w.part(name).disturb, w.part(name).lose_arbitration))()
 
     return RegisterWalk(
-        name=name, parts=(name, "DMA1") if number == 1 else (name,), begin=begin,
-        moves=(*(drive,) * 18, flags, called, called, called, disturbed, wires, checked),
+        name=name, parts=(name, "DMA1") if number == 1 else (name,), begin=begin, remaps=(2,) * (number == 1),
+        moves=(*(drive,) * 18, flags, called, called, called, disturbed, wires, wires, unheeded, checked),
         spans_ns=(125, 3_000, 10_000, 25_000, 90_000, 90_000, 100_000, 300_000, 26_000_000), at_random=14, steps=34,
         episodes=40 if number == 1 else 16,
     )  # fmt: skip
@@ -279,23 +313,52 @@ _INRQ, _SLEEP = 1, 2
 def _can_begin(w: RegisterWalker) -> None:
     _pins(w, inputs="A11")
     w.write("CAN.MCR", _INRQ)
-    w.write("CAN.BTR", w.pick((0, 0, 0, 1 << 30, 1 << 31, 3 << 30)) | w.pick((0x14_0001, 0x14_0001, 0x23_0001)))
-    w.write("CAN.FMR", 1)
-    for register, choices in (
-        ("FM1R", (0, 1, 2, 3)), ("FS1R", (3, 3, 0, 1)), ("FFA1R", (0, 1, 2)), ("FA1R", (1, 3, 0x3FFF)),
-        ("F0R1", (0, 0, 0x2460_0000)), ("F0R2", (0, 0, 0xFFE0_0000)), ("F1R1", (0x123 << 21, 0)), ("F1R2", (0, 4)),
-    ):  # fmt: skip
-        w.write(f"CAN.{register}", w.pick(choices))
-    w.write("CAN.FMR", 0)
+    mode = w.turn_of((0, 0, 1 << 30, 0, 0, 3 << 30, 0, 1 << 31))
+    w.write("CAN.BTR", mode | w.pick((0x14_0001, 0x14_0001, 0x23_0001, 0x130_0000, 0x1C_0003)))
+    _can_filters(w)
     w.write("CAN.IER", w.some(*(1 << n for n in (0, 1, 2, 3, 4, 5, 6, 8, 9, 10, 11, 15, 16, 17))))
     w.write("CAN.MCR", w.some(4, 8, 16, 32, 64, 128))
     w.run(30_000)
 
 
+def _can_filters(w: RegisterWalker) -> None:
+    """Set up banks 0, 1, 2 and 13: each a filter of another kind, of 32 or 16 bits, a mask or a list."""
+    w.write("CAN.FMR", 1)
+    kinds = w.number(1 << 6)
+    w.write("CAN.FM1R", kinds & 7 | (kinds & 1) << 13)
+    w.write("CAN.FS1R", kinds >> 3 | (kinds >> 3 & 1) << 13)
+    w.write("CAN.FFA1R", w.pick((0, 1, 2, 5, 0x2002)))
+    w.write("CAN.FA1R", w.pick((1, 3, 7, 0x2003, 0x3FFF)))
+    for bank in (0, 1, 2, 13):
+        is_list, is_wide = (w.look(f"CAN.{name}") >> bank & 1 for name in ("FM1R", "FS1R"))
+        words = _wide_filters(w) if is_wide else (_narrow_filters(w), _narrow_filters(w))
+        for half, word in enumerate(words):
+            masks = word if is_list else (word & 0xFFFF_0000, word & 0xFFFF)[half] if is_wide else word
+            w.write(f"CAN.F{bank}R{half + 1}", masks)
+    if w.number(5):
+        w.write("CAN.FMR", 0)
+
+
+def _wide_filters(w: RegisterWalker) -> tuple[int, int]:
+    """Return an identifier, and one more or a mask of it, as a bank of 32 bits has them."""
+    frame = _frame(w)
+    word = frame.identifier << 3 | 4 if frame.is_extended else frame.identifier << 21
+    return word | 2 * frame.is_remote, w.pick((0, 0xFFE0_0000, 0xFFFF_FFFF, 4, word ^ 8, 6, 0xFFFF_FFF8))
+
+
+def _narrow_filters(w: RegisterWalker) -> int:
+    """Return two identifiers, or one and a mask, as half a bank of 16 bits has them."""
+    frame = _frame(w)
+    base, high = (frame.identifier >> 18, frame.identifier >> 15 & 7) if frame.is_extended else (frame.identifier, 0)
+    word = base << 5 | frame.is_remote << 4 | frame.is_extended << 3 | high
+    return word | w.pick((0, 0xFFFF, 0xFFE0, 0xFFF8, 0xF, 0x18, word)) << 16
+
+
 def _frame(w: RegisterWalker) -> CanFrame:
     identifier = w.pick((0x123, 0x124, 0x7FF, 0))
     if w.number(3) == 0:
-        return CanFrame(identifier=identifier << 18 | 0x155, is_extended=True, data=bytes(range(w.number(9))))
+        low = w.pick((0x155, 0x1_0155, 0x2_8000, 0x3_FFFF, 0))
+        return CanFrame(identifier=identifier << 18 | low, is_extended=True, data=bytes(range(w.number(9))))
     if w.number(5) == 0:
         return CanFrame(identifier=identifier, is_remote=True, remote_bytes=w.number(9))
     return CanFrame(identifier=identifier, data=bytes(w.number(256) for _ in range(w.number(9))))
@@ -304,7 +367,7 @@ def _frame(w: RegisterWalker) -> CanFrame:
 def _can_send(w: RegisterWalker) -> None:
     mailbox, frame = w.number(3), _frame(w)
     padded = frame.data.ljust(8, b"\0")
-    w.write(f"CAN.TDT{mailbox}R", frame.dlc | w.some(1 << 8))
+    w.write(f"CAN.TDT{mailbox}R", w.pick((frame.dlc, frame.dlc, frame.dlc, 8, 9, 15)) | w.some(1 << 8))
     w.write(f"CAN.TDL{mailbox}R", int.from_bytes(padded[:4], "little"))
     w.write(f"CAN.TDH{mailbox}R", int.from_bytes(padded[4:], "little"))
     identifier = frame.identifier << 3 | 4 if frame.is_extended else frame.identifier << 21
@@ -345,18 +408,75 @@ def _can_damage(w: RegisterWalker) -> None:
     w.network.damage(w.pick((1, 3, 17, 40)))
 
 
+def _can_flood(w: RegisterWalker) -> None:
+    """More frames than a FIFO holds."""
+    w.turn("CAN.MCR", on=w.some(8), off=w.some(8))
+    for _ in range(4):
+        _can_hear(w)
+    w.run(1_200_000)
+    for _ in range(w.number(5)):
+        _can_take(w)
+
+
+def _can_off(w: RegisterWalker) -> None:
+    """Become error passive or go off the bus, and come back, by ABOM or by a program."""
+    w.turn("CAN.MCR", on=w.some(64), off=16 | _INRQ | _SLEEP)
+    _can_send(w)
+    w.network.damage(w.pick((15, 16, 31, 32, 33)))
+    w.run(w.pick((3_000_000, 7_000_000)))
+    w.turn("CAN.MCR", on=_INRQ)
+    w.run(3_000)
+    w.turn("CAN.MCR", off=_INRQ)
+    w.run(w.pick((2_500_000, 3_200_000, 300_000)))
+
+
+def _can_listener(w: RegisterWalker) -> None:
+    """Somebody listens to frames for a while."""
+    part = w.part("CAN")
+    end = part.subscribe(
+        lambda ends: w.note(" ".join(f"{one.start_ns} {one.end_ns} {one.error.value}" for one in ends))
+    )
+    _can_send(w)
+    _can_hear(w)
+    w.run(700_000)
+    end()
+    w.note(f"{part.sends_at('PA11')} {part.sends_at('PB8')} {part.bit_rate}")
+
+
+def _can_unwired(w: RegisterWalker) -> None:
+    """Take its pin, and give it back."""
+    w.write("GPIOA.CRH", w.pick((0xBBB4_4BBB, 0xBBB3_4BBB, 0xBBBF_4BBB)))
+    if w.number(2):
+        w.turn("CAN.MCR", on=_INRQ)
+        w.turn("CAN.MCR", off=_INRQ | _SLEEP)
+        w.run(30_000)
+        _can_send(w)
+    w.run(w.pick((125, 200_000)))
+    w.write("GPIOA.CRH", 0xBBBB_4BBB)
+
+
+def _can_repeated(w: RegisterWalker) -> None:
+    """The same frame for long, and what ends its tries."""
+    w.turn("CAN.MCR", off=3 | 16 | 0x8000)
+    _can_send(w)
+    w.run(w.pick((4_000_000, 6_000_000, 6_100_123)))
+    w.run(w.pick((125, 100_000, 333_333)))
+    w.pick((_can_flags, _can_send, _can_unwired, _can_mode, _can_wire, _can_take))(w)
+
+
 _CAN = RegisterWalk(
-    name="CAN", parts=("CAN",), begin=_can_begin,
-    moves=(_can_send, _can_send, _can_hear, _can_hear, _can_take, _can_take, _can_flags, _can_mode, _can_damage),
+    name="CAN", parts=("CAN",), begin=_can_begin, remaps=(0x4000, 0x6000),
+    moves=(*(_can_send, _can_send, _can_hear, _can_hear, _can_take, _can_take, _can_flags, _can_mode, _can_damage) * 2,
+           _can_flood, _can_off, _can_listener, _can_unwired, _can_filters),
     spans_ns=(125, 2_000, 22_000, 100_000, 250_000, 600_000, 3_000_000), at_random=20, episodes=30,
 )  # fmt: skip
 
 
 #: With nobody who acknowledges: the same frame again and again, which C alone repeats.
 _CAN_ALONE = RegisterWalk(
-    name="CAN-alone", parts=("CAN",), begin=_can_begin, is_alone=True,
-    moves=(_can_send, _can_send, _can_take, _can_flags, _can_mode, _can_wire),
-    spans_ns=(2_000, 22_000, 100_000, 300_000, 900_000, 3_000_000), at_random=12, episodes=14,
+    name="CAN-alone", parts=("CAN",), begin=_can_begin, is_alone=True, remaps=(0x4000,),
+    moves=(_can_send, _can_send, _can_take, _can_flags, _can_mode, _can_wire, _can_repeated, _can_repeated),
+    spans_ns=(2_000, 22_000, 100_000, 300_000, 900_000, 3_000_000), at_random=12, episodes=18,
 )  # fmt: skip
 
 # USB.
@@ -366,13 +486,9 @@ _USB_ADDRESS = 5
 
 def _usb_begin(w: RegisterWalker) -> None:
     if w.board.hclk_hz == 8_000_000:
-        w.write("FLASH.ACR", 0x12)
-        w.turn("RCC.CR", on=1 << 16)
-        w.run(2_000_000)
-        w.write("RCC.CFGR", 1 << 16 | 7 << 18 | 4 << 8)
-        w.turn("RCC.CR", on=1 << 24)
-        w.run(200_000)
-        w.turn("RCC.CFGR", on=2)
+        w.hurry()
+    if not w.number(8):
+        w.turn("RCC.CFGR", on=7 << 8)
     w.drive("PA12", None)
     w.write("USB.CNTR", 1)
     w.write("USB.CNTR", w.some(*(1 << n for n in range(8, 16))))
@@ -381,7 +497,8 @@ def _usb_begin(w: RegisterWalker) -> None:
     w.write("USB.BTABLE", w.pick((0, 0, 0x40)))
     for n in range(3):
         at = 2 * w.look("USB.BTABLE")
-        for word, value in enumerate((64 + 128 * n, 8 * n, 128 + 128 * n, w.pick((0x8400, 0x1000)))):
+        sizes = w.pick((8 * n, 8 * n, 64, 0x1FF, 0x201, 0x3FF)), w.pick((0x8400, 0x1000, 0x7C00, 0xFC00, 0x8000, 0x400))
+        for word, value in enumerate((64 + 128 * n, sizes[0], 128 + 128 * n, sizes[1])):
             w.part("USB").write(0x400 + at + 16 * n + 4 * word, 4, value)
         w.write(f"USB.EP{n}R", w.pick((0x3230, 0x3030, 0x3130, 0x3430, 0x3630, 0x1010, 0x2020)) | w.some(0x4040) | n)
     _usb_bus(w)
@@ -396,14 +513,20 @@ def _usb_bus(w: RegisterWalker) -> None:
 
 def _usb_transaction(w: RegisterWalker) -> None:
     usb, token = w.part("USB"), w.pick((*Token, Token.OUT, Token.IN))
-    data = bytes(8) if token is Token.SETUP else bytes(range(w.pick((0, 1, 7, 8, 33, 64))))
+    length = (
+        w.pick((7, 8, 8, 8)) if token is Token.SETUP else w.pick((0, 1, 7, 8, 9, 32, 33, 62, 63, 64, 65, 513, 1023))
+    )
+    data = bytes(n & 0xFF for n in range(length))
     one = Transaction(
         token, w.pick((*(_USB_ADDRESS,) * 9, 6)), w.pick((0, 1, 2, 0, 1, 2, 3)), w.number(2),
         b"" if token is Token.IN else data, is_damaged=not w.number(12),
     )  # fmt: skip
     answer = usb.begin(one)
-    w.note(f"{one.token.value} {one.endpoint} {one.pid} {len(one.data)}: {answer}")
+    said = "" if answer is None else f"{answer.handshake} {answer.pid} {len(answer.data)} {zlib.crc32(answer.data):08x}"
+    w.note(f"{one.token.value} {one.endpoint} {one.pid} {len(one.data)}: {said}")
     w.note(f"{usb.would_nak(one.endpoint, is_in=True)} {usb.would_nak(one.endpoint, is_in=False)}")
+    if not w.number(20):
+        w.write("USB.DADDR", w.pick((0, 0x80 | 6)))
     if answer is not None and answer.handshake in {None, Handshake.ACK} and w.number(8):
         usb.end(one)
 
@@ -419,6 +542,31 @@ def _usb_again(w: RegisterWalker) -> None:
 
 def _usb_mode(w: RegisterWalker) -> None:
     w.turn("USB.CNTR", on=w.pick((0, 8, 12, 16, 1, 2)), off=w.pick((31, 31, 8, 16)))
+    if not w.number(4):
+        w.turn("CAN.MCR", on=w.some(1, 2), off=3)
+
+
+def _usb_sleep(w: RegisterWalker) -> None:
+    """Be suspended, and be woken by the host or wake it."""
+    w.turn("USB.CNTR", on=8 | w.some(4), off=3)
+    w.run(w.pick((125, 1_000_000, 4_000_000)))
+    if w.number(2):
+        state = w.pick((BusState.RESET, BusState.RESUME, BusState.IDLE))
+        w.note(f"bus {state.value}")
+        w.part("USB").bus_changed(state, w.board.now_ns, 9)
+    else:
+        w.turn("USB.CNTR", on=16)
+        w.run(w.pick((125, 1_000_000)))
+        w.turn("USB.CNTR", off=w.pick((16, 16, 24)))
+    w.read("USB.FNR")
+    w.note(f"host {w.host.sum:x}")
+
+
+def _usb_iso(w: RegisterWalker) -> None:
+    """Make an endpoint isochronous, or a bulk one of two buffers."""
+    n = w.number(3)
+    now = w.look(f"USB.EP{n}R")
+    w.write(f"USB.EP{n}R", now & 0xF | w.pick((0x400, 0x100, 0x500, 0x200)) | 0x8080 | (now ^ 0x3030) & 0x3030)
 
 
 def _usb_cable(w: RegisterWalker) -> None:
@@ -430,8 +578,9 @@ def _usb_cable(w: RegisterWalker) -> None:
 
 _USB = RegisterWalk(
     name="USB", parts=("USB",), begin=_usb_begin, beside=(),
-    moves=(*(_usb_transaction,) * 6, _usb_again, _usb_again, _usb_again, _usb_bus, _usb_mode, _usb_cable),
-    spans_ns=(1_000, 50_000, 400_000, 1_000_000, 3_100_000), at_random=12, episodes=24, steps=30,
+    moves=(*(*(_usb_transaction,) * 6, _usb_again, _usb_again, _usb_again, _usb_bus, _usb_mode, _usb_cable) * 2,
+           _usb_sleep, _usb_iso),
+    spans_ns=(1_000, 50_000, 400_000, 1_000_000, 3_100_000), at_random=12, episodes=30, steps=30,
 )  # fmt: skip
 
 BUSES = (*map(_usart, (1, 2, 3)), *map(_spi, (1, 2)), *map(_i2c, (1, 2)), _CAN, _CAN_ALONE, _USB)

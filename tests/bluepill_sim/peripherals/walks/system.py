@@ -1,5 +1,7 @@
 """Walks of what the chip lives by: clocks, supply, flash, backup domain, watchdogs, ports, CRC."""
 
+import zlib
+
 from tests.bluepill_sim.peripherals.walks.walker import RegisterWalk, RegisterWalker
 
 # RCC.
@@ -33,8 +35,53 @@ def _rcc_crystal(w: RegisterWalker) -> None:
     w.note(f"crystal {w.board.crystal_works}")
 
 
+def _rcc_security(w: RegisterWalker) -> None:
+    """The crystal breaks under what it clocks, watched by CSS or not."""
+    w.board.crystal_works = True
+    w.turn("RCC.CR", on=1 << 16)
+    w.run(2_000_000)
+    w.turn("RCC.CR", on=w.pick((1 << 19, 1 << 19, 0)))
+    w.turn("RCC.CFGR", on=w.pick((1, 0, 1 << 16 | 2, 1 << 16)), off=0x3F_0003)
+    if w.look("RCC.CFGR") & 1 << 16:
+        w.turn("RCC.CR", on=1 << 24)
+        w.run(200_000)
+    w.run(1_000)
+    w.board.crystal_works = False
+    w.note("crystal breaks")
+    w.run(w.pick((125, 1_000, 50_000)))
+    w.write("RCC.CIR", w.pick((*(0x80_0000,) * 7, 0)))
+    w.board.crystal_works = bool(w.number(2))
+
+
+def _rcc_backup(w: RegisterWalker) -> None:
+    w.turn("RCC.APB1ENR", on=0x1800_0000)
+    w.write("PWR.CR", w.pick((0x100, 0x100, 0x100, 0)))
+    for word in w.pick(((0x1_0000, 0), (0x101, 0x201, 0x8101), (0x1_0000, 0x8300), (1, 0x8101))):
+        w.write("RCC.BDCR", word)
+        w.run(w.pick((125, 1_000)))
+
+
+def _rcc_low_power(w: RegisterWalker) -> None:
+    """What a mode of low power does to the clocks."""
+    kind, rcc = w.number(3), w.part("RCC")
+    w.note(("stop", "standby", "stops")[kind])
+    if kind < 2:
+        (rcc.stop, rcc.stand_by)[kind]()
+    else:
+        rcc.clock_stopped()
+        w.run(1_000)
+        rcc.clock_resumed(1_000)
+
+
+def _lsi(w: RegisterWalker) -> None:
+    hz = w.pick((40_000, 30_000, 60_000, 45_000, 29_999, 60_001))
+    w.note(f"LSI {hz}")
+    w.attempt(lambda: setattr(w.board, "lsi_hz", hz))
+
+
 _RCC = RegisterWalk(
-    name="RCC", parts=("RCC",), begin=_rcc_begin, moves=(*(_rcc_move,) * 9, _rcc_crystal),
+    name="RCC", parts=("RCC",), begin=_rcc_begin,
+    moves=(*(_rcc_move,) * 9, _rcc_crystal, _rcc_security, _rcc_security, _rcc_backup, _rcc_low_power, _lsi),
     spans_ns=(125, 5_000, 100_000, 300_000, 2_100_000), episodes=24,
 )  # fmt: skip
 
@@ -71,6 +118,43 @@ def _flash_program(w: RegisterWalker) -> None:
     w.note(f"{call.__name__} {offset:#x} {size} {word:#x}: {call(offset, size, word)}")
 
 
+def _flash_open(w: RegisterWalker) -> None:
+    w.reset()
+    for register in ("KEYR", "OPTKEYR"):
+        w.write(f"FLASH.{register}", 0x4567_0123)
+        w.write(f"FLASH.{register}", 0xCDEF_89AB)
+
+
+def _flash_halfwords(w: RegisterWalker) -> None:
+    """Program what is blank and what is not, as soon as it is ready or sooner."""
+    flash = w.part("FLASH")
+    _flash_open(w)
+    w.write("FLASH.CR", w.pick((1, 0x401, 0x1401)))
+    for _ in range(4):
+        offset, word = w.pick((0x800, 0xFFE, 0x1000, 0x1802)) + 2 * w.number(2), w.pick((0, 0xFFFF, 0x1234))
+        call = w.pick((flash.program, flash.program, flash.program_at_once))
+        answer = call(offset) if call == flash.program_at_once else call(offset, w.pick((2, 2, 2, 2, 2, 1, 4)), word)
+        w.note(f"{offset:#x} {word:#x}: {answer} {flash.memory.read(offset, 2).hex()}")
+        w.run(w.pick((52_500, 52_500, 52_499, 20_000)))
+    w.write("FLASH.SR", 0x34)
+
+
+def _flash_all(w: RegisterWalker) -> None:
+    """Erase all, or the option bytes, and write such."""
+    flash = w.part("FLASH")
+    _flash_open(w)
+    for control in w.pick(((4, 0x44), (0x20, 0x260), (0x200, 0x240), (6, 0x46))):
+        w.write("FLASH.CR", control)
+        w.run(1_000)
+    w.run(w.pick((40_000_000, 19_999_000, 39_999_000)))
+    if w.number(2):
+        w.write("FLASH.CR", 0x210)
+        for offset in (2 * w.number(8), 2):
+            w.note(f"{flash.program_option(offset, w.pick((2, 2, 2, 4)), w.pick((0xFE, 0xFF, 0xA5, 0xF9)))}")
+            w.run(w.pick((52_500, 52_499)))
+    w.note(f"{zlib.crc32(flash.memory.read(0, flash.memory.size)):08x} {flash.memory.options.hex()}")
+
+
 def _flash_protect(w: RegisterWalker) -> None:
     """Erase the option bytes, or write a group's, and have a reset load them."""
     flash = w.part("FLASH")
@@ -78,7 +162,7 @@ def _flash_protect(w: RegisterWalker) -> None:
     w.run(20_000_000)
     if w.number(2):
         w.write("FLASH.CR", 0x210)
-        for offset, word in ((0, 0xA5), (8, w.pick((0xFE, 0xFC, 0xFD)))):
+        for offset, word in ((0, w.pick((0xA5, 0xA5, 0x11))), (8, w.pick((0xFE, 0xFC, 0xFD))), (2, w.number(8))):
             w.note(f"{flash.program_option(offset, 2, word)}")
             w.run(52_500)
     w.reset()
@@ -91,8 +175,9 @@ def _flash_protect(w: RegisterWalker) -> None:
 
 _FLASH = RegisterWalk(
     name="FLASH", parts=("FLASH",), begin=_flash_begin,
-    moves=(*(_flash_move, _flash_program) * 3, _flash_move, _flash_protect),
-    spans_ns=(125, 20_000, 52_500, 70_000, 20_000_000, 40_000_000), at_random=12,
+    moves=(*(_flash_move, _flash_program) * 3, _flash_move, _flash_protect, _flash_halfwords, _flash_halfwords,
+           _flash_all),
+    spans_ns=(125, 20_000, 52_500, 70_000, 20_000_000, 40_000_000), at_random=12, episodes=26,
 )  # fmt: skip
 
 # The backup domain and the supply.
@@ -133,6 +218,18 @@ def _rtc_move(w: RegisterWalker) -> None:
 def _rtc_read(w: RegisterWalker) -> None:
     for register in ("CNTH", "CNTL", "DIVL", "CRL"):
         w.read(f"RTC.{register}")
+    w.note(f"alarm {w.part('RTC').has_alarm}")
+
+
+def _rtc_cut(w: RegisterWalker) -> None:
+    """A reset while it is configured."""
+    w.turn("RTC.CRL", on=0x10)
+    w.write("RTC.ALRL", 9)
+    w.write("RTC.PRLL", 3)
+    w.part("RTC").reset()
+    w.note("reset")
+    w.turn("RTC.CRL", on=0x10)
+    w.turn("RTC.CRL", off=0x10)
 
 
 def _bkp_move(w: RegisterWalker) -> None:
@@ -157,12 +254,18 @@ def _pwr_move(w: RegisterWalker) -> None:
     w.drive("PA0", w.pick((False, True)))
     part = w.part("PWR")
     w.note(f"{part.stands_by} {part.is_woken} {part.regulator_is_slow}")
+    if not w.number(4):
+        w.pick((part.note_standby, part.forget_flags))()
 
 
 def _backup_domain(name: str, *parts: str) -> RegisterWalk:
-    moves = {"RTC": (_rtc_move, _rtc_move, _rtc_read), "BKP": (_bkp_move,), "PWR": (_pwr_move,)}[name]
+    moves = {
+        "RTC": (_rtc_move, _rtc_move, _rtc_read, _rtc_move, _rtc_read, _rtc_cut),
+        "BKP": (_bkp_move,),
+        "PWR": (_pwr_move,),
+    }[name]
     return RegisterWalk(
-        name=name, parts=(name, *parts), begin=_backup_begin, moves=(*moves, *moves, _rtc_move, _bkp_move),
+        name=name, parts=(name, *parts), begin=_backup_begin, moves=(*moves, *moves, _rtc_move, _bkp_move, _lsi),
         spans_ns=(125, 31_000, 62_000, 100_000, 1_000_000, 30_000_000), beside=("RCC", "EXTI"),
     )  # fmt: skip
 
@@ -179,6 +282,26 @@ def _dog_begin(w: RegisterWalker) -> None:
     w.write("IWDG.KR", w.pick((0xAAAA, 0xCCCC, 0xAAAA)))
 
 
+def _dog_by_itself(w: RegisterWalker) -> None:
+    """A reset after which the option bytes may have IWDG run, or one key more or less."""
+    w.board.chip.power.starts_watchdog = bool(w.number(2))
+    w.part("IWDG").reset()
+    w.note(f"{w.part('IWDG').is_running}")
+    for key in w.pick(((0x5555, 0xCCCC), (0xCCCC, 0xCCCC), (0x5555, 0xAAAA), (0x1_5555,))):
+        w.write("IWDG.KR", key)
+        w.write("IWDG.RLR", w.number(0x1000))
+        w.write("IWDG.PR", w.number(8))
+        w.read("IWDG.SR")
+
+
+def _dog_stands(w: RegisterWalker) -> None:
+    part, span_ns = w.part("IWDG"), w.pick((1_000, 512_000, 8_000_000))
+    w.note(f"IWDG frozen {span_ns}")
+    part.freeze()
+    w.run(span_ns)
+    part.thaw(span_ns)
+
+
 def _dog_move(w: RegisterWalker) -> None:
     register, words = w.pick((
         ("IWDG.KR", (0x5555, 0xAAAA, 0xAAAA, 0xCCCC, 0)), ("IWDG.PR", (0, 2, 5)), ("IWDG.RLR", (1, 30, 0xFFF)),
@@ -189,7 +312,8 @@ def _dog_move(w: RegisterWalker) -> None:
 
 
 _DOGS = RegisterWalk(
-    name="watchdogs", parts=("WWDG", "IWDG"), begin=_dog_begin, moves=(_dog_move,), at_random=12,
+    name="watchdogs", parts=("WWDG", "IWDG"), begin=_dog_begin,
+    moves=(*(_dog_move,) * 6, _dog_by_itself, _dog_stands, _lsi), at_random=12,
     spans_ns=(1_000, 100_000, 512_000, 3_000_000, 8_000_000, 40_000_000), beside=("RCC",),
 )  # fmt: skip
 
@@ -202,6 +326,7 @@ _REMAPS = (
 
 
 def _port_begin(w: RegisterWalker) -> None:
+    w.write("AFIO.MAPR", w.pick((2 << 24, 2 << 24, 0, 1 << 24, 4 << 24)))
     for port in "ABC":
         w.write(f"GPIO{port}.CRL", w.pick((0x4444_4444, 0x3333_3333, 0x8888_8888, 0x7777_7777, 0x1248_B730)))
         w.write(f"GPIO{port}.CRH", w.pick((0x4444_4444, 0x3333_3333, 0x8888_8888, 0x7777_7777, 0x1248_B730)))
@@ -227,8 +352,11 @@ def _port_write(w: RegisterWalker) -> None:
 
 def _port_lock(w: RegisterWalker) -> None:
     name, pins = f"GPIO{w.pick('ABC')}.LCKR", w.number(1 << 16)
-    for key in (1 << 16, 0, 1 << 16):
-        w.write(name, key | pins)
+    wrong, cut = w.pick((0, 0, 0, 0, 1, 2, 3)), w.pick((0, 0, 0, 0, 2, 3))
+    for n, key in enumerate((1 << 16, 0, 1 << 16), 1):
+        if n == cut:
+            w.part(name[:5]).reset()
+        w.write(name, (key ^ (1 << 16 if n == wrong else 0)) | pins)
     w.read(name)
     w.read(name)
 
@@ -236,6 +364,15 @@ def _port_lock(w: RegisterWalker) -> None:
 def _port_exti(w: RegisterWalker) -> None:
     register = w.pick(("SWIER", "PR", "IMR", "RTSR", "EMR"))
     w.write(f"EXTI.{register}", w.pick((0, 0x7FFFF, 1 << w.number(19))))
+
+
+def _port_wait(w: RegisterWalker) -> None:
+    """Inputs that nobody drives, and pins of another, after a while."""
+    port = w.pick("AABC")
+    for half in "LH":
+        w.write(f"GPIO{port}.CR{half}", w.pick((0x4444_4444, 0x4444_4484, 0x1444_4444, 0x3333_3333)))
+    w.read(f"GPIO{port}.IDR")
+    w.run(w.pick((999_000, 1_000_000, 1_100_000)))
 
 
 def _port_remap(w: RegisterWalker) -> None:
@@ -246,8 +383,8 @@ def _port_remap(w: RegisterWalker) -> None:
 def _ports(name: str, *parts: str) -> RegisterWalk:
     return RegisterWalk(
         name=name, parts=(name, *parts), begin=_port_begin,
-        moves=(_port_pin, _port_pin, _port_write, _port_lock, _port_exti, _port_remap), spans_ns=(125, 1_000),
-        at_random=30, episodes=20,
+        moves=(_port_pin, _port_pin, _port_write, _port_lock, _port_exti, _port_remap, _port_wait),
+        spans_ns=(125, 1_000), at_random=30, episodes=22,
     )  # fmt: skip
 
 

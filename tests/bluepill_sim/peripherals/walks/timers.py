@@ -8,12 +8,19 @@ _TIM_PINS = {
     1: ("PA8", "PA9", "PA10", "PA11", "PA12", "PB12", "PB13"), 2: ("PA0", "PA1", "PA2", "PA3"),
     3: ("PA6", "PA7", "PB0", "PB1"), 4: ("PB6", "PB7", "PB8", "PB9"),
 }  # fmt: skip
+_TIM_REMAPS = {1: (0x40, 0xC0), 2: (0x100, 0x200, 0x300), 3: (0x800, 0xC00), 4: (0x1000,)}
 #: Output modes of two channels; inputs with filters and prescalers; one of each.
-_MODES = (0x6868, 0x7878, 0x3030, 0x1131, 0x4050, 0x0101, 0x3201, 0x0D25, 0x6803, 0x0168, 0x6C6C)
-_SLAVES = (0, 0, 0, 1, 2, 3, 0x44, 0x54, 0x55, 0x56, 0x57, 0x64, 0x77, 0x05, 0x16, 0x67, 0x4477, 0x80, 0xB2F7)
+_MODES = (
+    0x6060, 0x6868, 0x7070, 0x7878, 0x3030, 0x1131, 0x4050, 0x0101, 0x3201, 0x0D25, 0x6803, 0x0168, 0x6C6C, 0x1020,
+    0x2010,
+)  # fmt: skip
+_SLAVES = (
+    0, 0, 0, 0, 0, 1, 2, 3, 0x44, 0x54, 0x55, 0x56, 0x57, 0x64, 0x77, 0x05, 0x16, 0x67, 0x4477, 0x80, 0xB2F7, 0x4000,
+    0x7000, 0xC007, 0x5071,
+)  # fmt: skip
 
 
-def _tim(number: int) -> RegisterWalk:  # noqa: C901 - a function a move
+def _tim(number: int) -> RegisterWalk:  # noqa: C901, PLR0915 - a function a move
     name = f"TIM{number}"
     other = "TIM1" if number == 2 else "TIM2"
 
@@ -27,11 +34,15 @@ def _tim(number: int) -> RegisterWalk:  # noqa: C901 - a function a move
         w.write(f"{name}.ARR", w.pick((0, 1, 9, 30, 200)))
         for n in range(1, 5):
             w.write(f"{name}.CCR{n}", w.pick((0, 1, 5, 9, 29, 30, 300)))
-        w.write(f"{name}.CCMR1", w.pick(_MODES))
+        w.write(f"{name}.CCMR1", w.turn_of(_MODES))
         w.write(f"{name}.CCMR2", w.pick(_MODES))
+        if number == 1 and not w.number(3):
+            w.turn("RCC.CR", on=1 << 16)
+            w.run(2_000_000)
+            w.turn("RCC.CR", on=1 << 19)
         w.write(f"{name}.CCER", w.pick((0x1111, 0x3333, 0x0555, 0x0DDD, 0x0F7B, 0x1010)))
         w.write(f"{name}.SMCR", w.pick(_SLAVES))
-        w.write(f"{name}.DIER", w.pick((0, 0x1F, 0x5F, 0xFFFF, 0x7F00)))
+        w.write(f"{name}.DIER", w.pick((0, 0, 0x1F, 0x5F, 0xFFFF, 0x7F00)))
         w.write(f"{name}.CR2", w.pick((0, 0x10, 0x20, 0x30, 0x40, 0x50, 0x70, 0x80, 0xFF, 5)))
         if number == 1:
             w.write("TIM1.BDTR", w.pick((0x8000, 0x8000, 0xC010, 0xD005, 0xFC83, 0xBC20)) | w.number(16))
@@ -63,6 +74,21 @@ def _tim(number: int) -> RegisterWalk:  # noqa: C901 - a function a move
         for n in range(w.pick((3, 4, 5))):
             w.drive(name_of_pin, bool((n + first) % 2))
             w.run(w.pick((250, 500, 625, 1_125, 2_000)))
+        if not w.number(3):
+            w.write(f"{name}.CCMR{1 + w.number(2)}", w.pick((0x0101, 0x2121)))
+
+    def crystal(w: RegisterWalker) -> None:
+        w.board.crystal_works = not w.board.crystal_works
+        w.note(f"crystal {w.board.crystal_works}")
+
+    def duty(w: RegisterWalker) -> None:
+        """A wave, and other lengths of its pulse in the midst of it."""
+        n = 1 + w.number(4)
+        w.write(f"{name}.CCMR{(n + 1) // 2}", w.pick((0x6060, 0x7070, 0x6868)))
+        w.write(f"{name}.ARR", 39)
+        for _ in range(3):
+            w.run(w.pick((6_000, 11_000, 20_125)))
+            w.write(f"{name}.CCR{n}", w.pick((0, 3, 10, 20, 30, 39, 40, 50)))
 
     def compare(w: RegisterWalker) -> None:
         w.write(f"{name}.CCR{1 + w.number(4)}", w.number(40))
@@ -76,15 +102,18 @@ def _tim(number: int) -> RegisterWalk:  # noqa: C901 - a function a move
 
     def shape(w: RegisterWalker) -> None:
         register, words = w.pick((
-            ("ARR", (0, 3, 30, 31)), ("PSC", (0, 1, 3)), ("CNT", (0, 5, 29, 65_535)), ("CR1", (0, 1, 0x11, 0x81, 0x61)),
+            ("ARR", (0, 3, 30, 31)), ("PSC", (0, 1, 3)), ("CNT", (0, 5, 29, 32, 65_500, 65_535)),
+            ("CR1", (0, 1, 0x11, 0x81, 0x61)),
             ("SMCR", _SLAVES), ("BDTR" if number == 1 else "CR2", (0x8000, 0x50, 0x9000, 0xB000)),
             ("CCER", (0, 0x1111, 0x3333, 0x0DDD)), ("CCMR1", _MODES), ("CCMR2", _MODES),
         ))  # fmt: skip
         w.write(f"{name}.{register}", w.pick(words))
 
+    moves = (pin, pin, glitch, glitch, compare, clear, clear, generate, shape, shape, duty)
     return RegisterWalk(
-        name=name, parts=(name, "DMA1"), begin=begin, moves=(pin, pin, glitch, compare, clear, clear, generate, shape),
-        spans_ns=(125, 250, 1_000, 1_125, 4_000, 10_000, 31_000), beside=(other,), episodes=30 if number < 3 else 8,
+        name=name, parts=(name, "DMA1"), begin=begin, remaps=_TIM_REMAPS[number],
+        moves=(*moves, crystal) if number == 1 else moves,
+        spans_ns=(125, 250, 1_000, 1_125, 4_000, 10_000, 31_000), beside=(other,), episodes=30 if number < 3 else 10,
     )  # fmt: skip
 
 
@@ -95,17 +124,20 @@ _DUALS = (0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9)
 
 
 def _adc_begin(w: RegisterWalker) -> None:
-    w.write("GPIOA.CRL", 0)
+    w.write("GPIOA.CRL", w.pick((0, 0, 0, 0x0000_4400)))
+    w.board.temperature_c = w.pick((25.0, -20.0, 80.0))
     for n in range(4):
         w.board.pin(f"PA{n}").set_volts(0.5 * n + 0.2)
     wave = Oscillation(shape=Waveform.TRIANGLE, low_v=0, high_v=3.3, period_ns=70_000)
     w.board.pin("PA4").set_volts(wave)
+    is_plain = not w.number(4)
     for name in ("ADC1", "ADC2"):
         dual = w.pick(_DUALS) << 16 if name == "ADC1" else 0
         scanned = w.some(0x20, 0x40, 0x80, 0x100, 0x200, 0x400, 0x800, 0x1000, 1 << 22, 1 << 23)
-        w.write(f"{name}.CR1", dual | scanned | w.pick((0, 4)) | w.number(2) << 13)
+        plain = w.pick((0, 0x100, 1 << 10 | 0x100, 1 << 10))
+        w.write(f"{name}.CR1", plain if is_plain else dual | scanned | w.pick((0, 4)) | w.number(2) << 13)
         w.write(f"{name}.SQR1", w.number(4) << 20)
-        w.write(f"{name}.SQR3", w.number(5) | w.number(5) << 5 | w.number(18) << 10)
+        w.write(f"{name}.SQR3", w.pick((w.number(5), 16, 17)) | w.number(5) << 5 | w.number(18) << 10)
         w.write(f"{name}.JSQR", w.number(4) << 20 | w.number(5) << 15 | w.number(5) << 10 | w.number(5) << 5)
         w.write(f"{name}.SMPR2", w.pick((0, 0o1234567, 0o7777777)))
         w.write(f"{name}.HTR", w.pick((0xFFF, 0x700)))
@@ -113,7 +145,7 @@ def _adc_begin(w: RegisterWalker) -> None:
         w.write(f"{name}.JOFR{1 + w.number(4)}", w.number(0x400))
         select = w.pick((7, 7, 7, 0, 3, 6)) << 17 | w.pick((7, 7, 0, 1, 6)) << 12
         control = 1 | select | _EXTTRIG | _JEXTTRIG | w.some(2, 2048) | (w.some(256, _TSVREFE) if name == "ADC1" else 0)
-        w.write(f"{name}.CR2", control)
+        w.write(f"{name}.CR2", control & ~256 | 2 if is_plain else control)
     for register in ("IMR", "EMR", "RTSR"):
         w.write(f"EXTI.{register}", 1 << 11 | 1 << 15)
     w.write("DMA1.CPAR1", BASES["ADC1"] + 0x4C)
@@ -161,13 +193,13 @@ def _adc_pin(w: RegisterWalker) -> None:
 _ADC = RegisterWalk(
     name="ADC", parts=("ADC1", "ADC2", "DMA1"), begin=_adc_begin,
     moves=(_adc_start, _adc_start, _adc_start, _adc_trigger, _adc_take, _adc_take, _adc_calibrate, _adc_pin),
-    spans_ns=(125, 1_000, 3_500, 7_000, 14_000, 30_000, 100_000), beside=("TIM1",), at_random=18, episodes=34,
+    spans_ns=(125, 1_000, 3_500, 7_000, 14_000, 30_000, 100_000), beside=("TIM1",), at_random=18, episodes=36,
 )  # fmt: skip
 
 
 # DMA.
 
-_REGISTERS = ("GPIOA.ODR", "TIM2.CCR1", "CRC.DR", "USART1.DR", "GPIOB.BSRR")
+_REGISTERS = ("DMA1.CCR2", "DMA1.CCR5", "GPIOA.ODR", "TIM2.CCR1", "CRC.DR", "USART1.DR", "GPIOB.BSRR")
 
 
 def _dma_begin(w: RegisterWalker) -> None:

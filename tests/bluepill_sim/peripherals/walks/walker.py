@@ -1,17 +1,20 @@
 """A walk: a peripheral driven at random from reset, and a trace of all that can be seen of it, step by step.
 
 Theory of operation. A walk has episodes. Each begins on a board out of reset, whose core sleeps, sets the peripheral up
-in a mode, and goes some steps at random: what the mode expects (a word, a START, a call from outside), registers at
-random, time. What a step did is a line: what was done and read, which registers are otherwise than before, edges and
-words that came out, lines inside the chip, when a part acts next, warnings, resets. In the middle of each episode the
-board is saved and another one goes on from there, which no line may show.
+in a mode, each in turn, and goes some steps at random: what the mode expects (a word, a START, a call from outside),
+registers at random, time. What a step did is a line: what was done and read, which registers are otherwise than before,
+edges and words that came out, lines inside the chip, when a part acts next, warnings, resets. In the middle of each
+episode the board is saved and another one goes on from there, which no line may show.
 
-Every other episode has somebody who looks at the pins: models that talk in words make their edges only then.
+Every other episode has somebody who looks at the pins: models that talk in words make their edges only then. In every
+third a program makes the accesses, which comes to each in the middle of a block: models see such a one at its time only
+where they say that it matters.
 
 Invariant: an episode follows from its name alone, on every version of Python.
 """
 
 import random
+import struct
 import zlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -19,6 +22,7 @@ from functools import cache, partial
 from typing import Any, TypeVar
 
 from bluepill_sim import BluePill
+from bluepill_sim.core.unicorn_core import Reg
 from bluepill_sim.fabric.fabric import OWN_COMMANDS
 from bluepill_sim.fabric.pins import PinDrive
 from bluepill_sim.fabric.registers import WORD, Register, fields_of
@@ -50,6 +54,18 @@ _USUAL_WORDS = 0x100
 #: How each drive of a pin is written.
 _LETTERS = dict(zip(PinDrive, "ZHLudxyzw", strict=False))
 
+#: HCLK out of reset.
+_SLOW_HZ = 8_000_000
+
+#: Where the program stands that makes accesses: it survives what becomes of the flash memory.
+_PROGRAM, _HALFWORD_AT = 0x2000_0800, 2
+#: `wait` R0 rounds, make one access, and sleep: ldr R2, str, strh, strb R2 at R1, each with its way to `sleep`.
+_WAIT = (0x3801, 0xD1FD, 0x46C0, 0x46C0)
+_SLEEP = (0xBF30, 0xE7FD)
+_ACCESSES = {"load": 0x680A, 4: 0x600A, 2: 0x800A, 1: 0x700A}
+#: Most rounds, and how long a program has: some accesses never end.
+_MOST_ROUNDS, _PROGRAM_NS, _STEP_NS = 24, 40_000, 2_500
+
 #: RCC's offsets of AHBENR, APB2ENR and APB1ENR, and what has every clock on.
 _CLOCKS_ON = ((0x14, 0x55), (0x18, 0x7FFD), (0x1C, 0x1AE6_4807))
 
@@ -71,6 +87,8 @@ class RegisterWalk:
     spans_ns: tuple[int, ...]
     #: Parts that are traced besides.
     beside: tuple[str, ...] = ()
+    #: Words of AFIO_MAPR that move its pins.
+    remaps: tuple[int, ...] = ()
     #: Whether nobody else is on its CAN.
     is_alone: bool = False
     #: Of 100 steps so many write or read a register at random.
@@ -142,6 +160,33 @@ class CountingI2cDevice(Stateful):
         self.sum = self.sum + 1 + at_ns & 0xFF
 
 
+def _answer(word: int, at_ns: int) -> int:
+    return 3 * word + at_ns & 0x1FF
+
+
+class CountingUsbHost(Stateful):
+    """What stands at the other end of a USB cable, counts what it is told, and acts each 0.7 ms of the first 7."""
+
+    STATE = ("sum", "next_ns")
+
+    def __init__(self) -> None:
+        self.sum, self.next_ns = 0, None
+
+    def advance_to(self, now_ns: int) -> None:
+        """Count."""
+        self.sum, self.next_ns = self.sum + 1, None
+        del now_ns
+
+    def device_changed(self, now_ns: int) -> None:
+        """Count, and act soon."""
+        self.sum += 0x100
+        self.next_ns = now_ns + 700_000 if self.sum & 0x300 == 0 else self.next_ns
+
+    def wake(self, now_ns: int) -> None:
+        """Count."""
+        self.sum += 0x10_0000 + now_ns
+
+
 class WalkedBoard:
     """A board whose core sleeps, with something at each of its buses; and what was heard of it."""
 
@@ -160,6 +205,16 @@ class WalkedBoard:
         self.heard: list[str] = []
         self._names = {pin.index: pin.name for pin in self.board.pins}
         self._closing: list[Callable[[], None]] = []
+        self.host = CountingUsbHost()
+        parts: dict[str, Any] = {**self.board.chip.parts.by_name}
+        parts["USB"].attach(self.host)
+        parts["USART2"].exchange = _answer
+        self.entries: dict[object, int] = {}
+        code: list[int] = []
+        for access, instruction in _ACCESSES.items():
+            self.entries[access] = _PROGRAM + _HALFWORD_AT * len(code)
+            code += (*_WAIT, instruction, *_SLEEP)
+        self.board.chip.memory.write(_PROGRAM, struct.pack(f"<{len(code)}H", *code))
         self._reset = self.saved()
 
     def saved(self) -> tuple[object, ...]:
@@ -236,6 +291,7 @@ class RegisterWalker:
         self.walk, self.episode = walk, episode
         self._random = random.Random(f"{walk.name} {episode}")
         self._now, self._other = boards(is_alone=walk.is_alone)
+        self._by_program = episode % 3 == 2
         for each in (self._now, self._other):
             each.begin(episode % 4)
         self.lines: list[str] = []
@@ -252,6 +308,10 @@ class RegisterWalker:
     def pick(self, items: Sequence[_Item]) -> _Item:
         """Return one of some."""
         return items[self.number(len(items))]
+
+    def turn_of(self, items: Sequence[_Item], every: int = 1) -> _Item:
+        """Return one of some: each in its turn, by the episode."""
+        return items[self.episode // every % len(items)]
 
     def some(self, *bits: int) -> int:
         """Return a word with some of these bits."""
@@ -274,6 +334,11 @@ class RegisterWalker:
         """Its CAN."""
         return self._now.network
 
+    @property
+    def host(self) -> CountingUsbHost:
+        """What stands at the other end of its USB cable."""
+        return self._now.host
+
     def part(self, name: str) -> Any:
         """Return a peripheral."""
         return self.board.chip.parts.by_name[name]
@@ -286,14 +351,37 @@ class RegisterWalker:
         """Write a register, "I2C1.CR1", or bytes of it."""
         part, register = self._found(name)
         self.note(f"{name}{f'+{byte}' if byte else ''}={value:#x}{'' if size == 4 else f':{size}'}")
-        part.write(register.offset + byte, size, value)
+        if not self._by_program or self._accessed(size, part.base + register.offset + byte, value) is None:
+            part.write(register.offset + byte, size, value)
 
     def read(self, name: str) -> int:
         """Read a register, with all that a read causes."""
         part, register = self._found(name)
-        value: int = part.read(register.offset, 4)
+        found = self._accessed("load", part.base + register.offset) if self._by_program else None
+        value = int(part.read(register.offset, 4) if found is None else found)
         self.note(f"{name}?{value:#x}")
         return value
+
+    def _accessed(self, access: object, address: int, value: int = 0) -> int | None:
+        """Have a program make an access; return what R2 is then; nothing where the core does not sleep before it."""
+        board = self.board
+        engine, end_ns = board.chip.engine, board.now_ns + _PROGRAM_NS
+        if not board.is_asleep:
+            return None
+        for register, word in ((Reg.R0, 1 + self.number(_MOST_ROUNDS)), (Reg.R1, address), (Reg.R2, value)):
+            engine.registers[register] = word
+        engine.jump(self._now.entries[access] | 1)
+        board.chip.processor.wake()
+        while not board.is_asleep and board.now_ns < end_ns:
+            board.advance_to(min(board.now_ns + _STEP_NS, end_ns))
+        return int(engine.registers[Reg.R2])
+
+    def attempt(self, act: Callable[[], object]) -> None:
+        """Do what may be refused, and note how."""
+        try:
+            act()
+        except ValueError as refusal:
+            self.note(str(refusal))
 
     def look(self, name: str) -> int:
         """Return what stands in a register, and cause nothing."""
@@ -350,11 +438,27 @@ class RegisterWalker:
         stop, go_on = self.pick(((part.freeze, part.thaw), (part.clock_stopped, part.clock_resumed)))
         stop()
         self.board.advance_to(self.board.now_ns + span_ns)
+        if not self.number(4):
+            self.reset()
         go_on(span_ns)
 
     def change_clocks(self) -> None:
         """Divide the buses' clocks otherwise."""
         self.write("RCC.CFGR", self.look("RCC.CFGR") & ~0x3FF0 | self.pick((0, 0x400, 0x2000, 0x80, 0x6580, 0x500)))
+
+    def hurry(self) -> None:
+        """Have the PLL make 72 MHz of the crystal."""
+        self.write("FLASH.ACR", 0x12)
+        self.turn("RCC.CR", on=1 << 16)
+        self.run(2_000_000)
+        self.write("RCC.CFGR", 1 << 16 | 7 << 18 | 4 << 8)
+        self.turn("RCC.CR", on=1 << 24)
+        self.run(200_000)
+        self.turn("RCC.CFGR", on=2)
+
+    def remap(self) -> None:
+        """Move a peripheral to other pins."""
+        self.write("AFIO.MAPR", 2 << 24 | self.pick((0, *self.walk.remaps)))
 
     def reset(self) -> None:
         """Reset the part alone."""
@@ -381,6 +485,8 @@ class RegisterWalker:
         self.write("AFIO.MAPR", 2 << 24)
         if not self.number(6):
             self._share_pins()
+        if self.episode % 9 == 7 and self.board.hclk_hz == _SLOW_HZ:
+            self.hurry()
         self.walk.begin(self)
 
     def _share_pins(self) -> None:
@@ -409,6 +515,8 @@ class RegisterWalker:
         kind = self.number(100)
         if kind < self.walk.at_random:
             (self.peek if kind % 5 == 0 else self.poke)()
+        elif 91 <= kind < 94:
+            self.remap()
         elif 94 <= kind < 97:
             self.change_clocks()
         elif 97 <= kind < 99:

@@ -178,9 +178,11 @@ def test_scenes_that_nobody_uses_any_more_leave_their_clients_to_new_ones(monkey
     assert len(opened) == engine.MOST_IDLE
     held = [make_body("bullet", room, P2DX) for _ in range(3)]
     assert len(opened) == len({body.scene.client for body in held}) == 3  # type: ignore[attr-defined]  # a BulletBody
-    looked = list[int]()
-    monkeypatch.setattr(engine, "gc", SimpleNamespace(collect=lambda: looked.append(len(opened))))
+    looked = list[tuple[int, int]]()
+    monkeypatch.setattr(
+        engine, "gc", SimpleNamespace(collect=lambda generation: looked.append((len(opened), generation)))
+    )
     held += [make_body("bullet", room, P2DX) for _ in range(2)]
-    assert looked == [4], "where all are in use, that is seen to again when there are twice as many"
+    assert looked == [(4, 1), (4, 2)], "where all are in use, that is seen to again when there are twice as many"
     held.clear()
     gc.collect()  # they go back to where they were taken from

@@ -1,9 +1,12 @@
 """The inside of a chip on a page: what a debugger would read, in the manual's words, and the run is not changed."""
 
+import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 
+from bluepill_sim.analysis.program_lines import NO_CODE
 from bluepill_sim.board import BluePill
 from bluepill_sim.debug.chip_state import (
     clock_rows,
@@ -12,7 +15,7 @@ from bluepill_sim.debug.chip_state import (
     source_place,
     stack_rows,
 )
-from p2os.view.header import PageDrawing, PageTable, PageText
+from p2os.view.header import PageDrawing, PageSection, PageSource, PageTable, PageText
 from p2os.view.run_control import RunCommand
 from p2os.view.targets import panels_of
 from robot_bench.bench import Bench
@@ -93,20 +96,61 @@ def test_the_core_the_stack_and_the_line_are_where_the_program_is(board: BluePil
     assert any(row.meaning.startswith("Reset_Handler") for row in stack)
     place = source_place(board)
     assert place is not None
-    assert place.around == ()  # its file is nowhere near
+    listing = look(board)[0].blocks[0]
+    assert isinstance(listing, PageText), "its file is nowhere near"
+    assert "is not to be had" in listing.text
     assert {row[0] for row in tables(board, "program")["Core"]} >= {"r0", "pc", "xpsr", "primask"}
 
 
-def test_the_source_around_the_next_line_is_shown_where_it_is_to_be_had() -> None:
-    bench = Bench.from_scenario("dodge", mode="direct", body="kinematic")
-    bench.run_until("20 ms")
-    assert isinstance(bench.chip, BluePill)
-    place = source_place(bench.chip)
+@pytest.fixture(scope="module")
+def dodge() -> Bench:
+    """Return a bench whose program's sources are beside it, 20 ms on."""
+    made = Bench.from_scenario("dodge", mode="direct", body="kinematic")
+    made.run_until("20 ms")
+    return made
+
+
+def look(chip: object, choice: str = "next line") -> Sequence[PageSection]:
+    return next(one for one in panels_of(chip) if one.name == "program").look(choice)
+
+
+def test_the_source_around_the_next_line_is_shown_with_what_has_run_of_it(dodge: Bench) -> None:
+    assert isinstance(dodge.chip, BluePill)
+    place = source_place(dodge.chip)
     assert place is not None
-    assert "wait_for" in dict(place.around)[place.line] or "interrupts_on" in dict(place.around)[place.line]
-    first = next(one for one in panels_of(bench.chip) if one.name == "program").look("")[0].blocks[0]
-    assert isinstance(first, PageText)
-    assert sum(line.startswith("→") for line in first.text.splitlines()) == 1
+    source = look(dodge.chip)[0].blocks[0]
+    assert isinstance(source, PageSource)
+    assert (source.title, source.next) == (f"{place.file}:{place.line} in {place.function}", place.line)
+    assert source.first <= place.line < source.first + len(source.lines) <= source.first + 13
+    assert re.search("wait_for|interrupts_on", source.lines[place.line - source.first])
+    assert source.ran_ns[place.line - source.first] == 0
+    assert {0, NO_CODE} <= set(source.ran_ns)
+
+
+def test_what_has_run_grows_as_the_program_goes_on(dodge: Bench) -> None:
+    assert isinstance(dodge.chip, BluePill)
+
+    def ran() -> tuple[dict[str, str], set[tuple[str, int]]]:
+        shares, sources = look(dodge.chip, "what has run")
+        table = shares.blocks[0]
+        assert isinstance(table, PageTable)
+        lines = {
+            (block.title, block.first + n)
+            for block in sources.blocks if isinstance(block, PageSource)
+            for n, at in enumerate(block.ran_ns) if at >= 0
+        }  # fmt: skip
+        return {row[0].text: row[1].text for row in table.rows}, lines
+
+    functions, lines = ran()
+    assert functions["Reset_Handler"] != "0 %"
+    assert functions["dodge_tick"] == "0 %"
+    before = dodge.snapshot()
+    dodge.run_until("3500 ms")
+    later, more = ran()
+    assert later["dodge_tick"] not in {"0 %", "100 %"}
+    assert lines < more
+    dodge.restore(before)
+    assert ran() == (later, more), "what was gone back over has run"
 
 
 def test_the_board_shows_each_pin_of_its_headers_and_the_led(board: BluePill) -> None:
@@ -139,7 +183,8 @@ def test_a_run_whose_inside_is_looked_at_leaves_the_same_trace(tmp_path: Path) -
 
     live = LiveRun(SCENARIO, speed=0.0, clock=clock)
     looks = [
-        ("program", ""),
+        ("program", "next line"),
+        ("program", "what has run"),
         ("board", ""),
         ("chip", "NVIC"),
         ("chip", "clock tree"),

@@ -39,5 +39,7 @@ def test_variables_registers_the_program_and_the_board_are_seen_from_the_page(tm
     assert any(row.startswith("CR10x4001380c") and "RXNEIE" in row for row in found["registers"])
     assert "→" in found["program"]
     assert "Reset_Handler" in found["program"]
+    assert any(row.startswith("main") and "%" in row for row in found["shares"])
+    assert min(found["lines"]) > 0, "lines that ran, that did not, and with a branch that went one way"
     assert found["board"].startswith("BluePill: LED off; ")
     assert len(set(found["at"])) <= 2, "all of one halt but the clock tree, which was looked at first"

@@ -22,7 +22,6 @@ from p2os.view.live import MOST_WAITING, StillRecording  # noqa: E402
 from p2os.view.recording import ViewRecording  # noqa: E402
 from p2os.view.run_control import RunCommand  # noqa: E402
 from p2os.view.server.serving import ViewServer, serving  # noqa: E402
-from robot_bench.cli.shown import targets  # noqa: E402
 from robot_bench.cli.shown.live_run import LiveRun  # noqa: E402
 from robot_bench.cli.shown.targets import run_target, scenario_target  # noqa: E402
 from robot_bench.recording.run_record import read_run  # noqa: E402
@@ -195,11 +194,11 @@ def test_a_scenario_that_is_shown_ends_with_its_report_and_ctrl_c_ends_it(
     alone: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    done = SimpleNamespace(folder=alone, was_interrupted=False)
+    monkeypatch.setattr("robot_bench.cli.shown.live_target.run_scenario", lambda *_args, **_more: done)
     target = scenario_target("motors")
     assert target is not None
     assert target.run is not None
-    done = SimpleNamespace(folder=alone, was_interrupted=False)
-    monkeypatch.setattr(targets, "run_scenario", lambda *_args, **_more: done)
     stayed: list[LiveRun] = []
 
     def stay(live: LiveRun) -> None:

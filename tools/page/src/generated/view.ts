@@ -340,8 +340,19 @@ export interface PagePlot {
 export interface PageSection {
   readonly title: string;
   readonly note: string;
-  readonly blocks: readonly (PageTable | PageText | PagePicture | PagePlot | PageList | PagePlan | PageDrawing)[];
+  readonly blocks: readonly (PageTable | PageText | PagePicture | PagePlot | PageList | PagePlan | PageDrawing | PageSource)[];
   readonly is_folded: boolean;
+}
+
+/** Lines of a source file, and which of them have run by the page's time. */
+export interface PageSource {
+  readonly kind: "source";
+  readonly title: string;
+  readonly lines: readonly string[];
+  readonly first: number;
+  readonly ran_ns: readonly number[];
+  readonly one_way: readonly number[];
+  readonly next: number;
 }
 
 /** A table; one without `head` has names in its first column. */
@@ -365,6 +376,7 @@ export interface PanelHeader {
   readonly name: string;
   readonly title: string;
   readonly choices: readonly string[];
+  readonly sections: readonly PageSection[];
 }
 
 /** What a panel shows. */
@@ -524,6 +536,6 @@ export interface RunState {
 }
 
 export type Standing = "" | "passed" | "failed" | "open";
-export type PageBlock = PageTable | PageText | PagePicture | PagePlot | PageList | PagePlan | PageDrawing;
+export type PageBlock = PageTable | PageText | PagePicture | PagePlot | PageList | PagePlan | PageDrawing | PageSource;
 export type Doing = "run" | "pause" | "go" | "step" | "back" | "speed" | "fork" | "choose" | "drop" | "compare" | "halt_at" | "halt_not_at" | "watch" | "watch_not" | "hand" | "drive" | "stop" | "save";
 export type StepUnit = "instruction" | "line" | "edge" | "packet" | "event" | "millisecond";

@@ -4,7 +4,7 @@ import { useEffect, useState } from "preact/hooks";
 import type { PanelHeader } from "../generated/view";
 import type { App, ViewKind } from "../shell/app";
 import { moment } from "../time/format";
-import { Sections } from "./report/blocks";
+import { BY_NOW, Sections } from "./report/blocks";
 
 export function panelView(panel: PanelHeader): ViewKind {
   return {
@@ -19,7 +19,8 @@ export function panelView(panel: PanelHeader): ViewKind {
 
 function Panel({ app, panel, host }: { app: App; panel: PanelHeader; host: HTMLElement }) {
   const [choice, setChoice] = useState(panel.choices[0] ?? ""), state = app.store.panels.value.get(`${panel.name} ${choice}`);
-  useEffect(() => whileSeen(host, () => app.store.look([panel.name, choice])), [choice]);
+  const isOver = panel.sections.length > 0, sections = isOver ? panel.sections : state?.sections;
+  useEffect(() => (isOver ? undefined : whileSeen(host, () => app.store.look([panel.name, choice]))), [choice]);
   return (
     <>
       {panel.choices.length > 0 && <div class="view-bar">
@@ -28,7 +29,7 @@ function Panel({ app, panel, host }: { app: App; panel: PanelHeader; host: HTMLE
         </select>
         {state && <span class="faint">{`at ${moment(state.at_ns, 1e3)}`}</span>}
       </div>}
-      <div class="report panel" tabIndex={0} role="group" aria-label={panel.title}>{state ? <Sections sections={state.sections} seek={(t) => app.clock.seek(t)} /> : <p class="view-note">Nothing has come yet.</p>}</div>
+      <div class="report panel" tabIndex={0} role="group" aria-label={panel.title}>{sections ? <BY_NOW.Provider value={isOver ? app.clock.now.value : Infinity}><Sections sections={sections} seek={(t) => app.clock.seek(t)} /></BY_NOW.Provider> : <p class="view-note">Nothing has come yet.</p>}</div>
     </>
   );
 }

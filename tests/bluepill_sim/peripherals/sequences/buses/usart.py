@@ -322,8 +322,8 @@ def _(chip: Bench, case: tuple[ReceiveError, int]) -> None:
 @USART.row(
     "tolerance",
     "A far end whose rate is within the tolerance raises no error; one at half of ours raises FE with its 0.",
-    rm("27.3.5", looked_up=False),
-    rm("27.3.3", looked_up=False),
+    rm("27.3.5"),
+    rm("27.3.3"),
     values=st.integers(98_000, 102_000),
 )
 def _(chip: Bench, far_baud: int) -> None:

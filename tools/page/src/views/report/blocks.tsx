@@ -1,13 +1,18 @@
 // The parts of a report: tables, lists, listings, pictures and plots, as the header's sections have them.
-import { useEffect, useRef } from "preact/hooks";
-import type { PageBlock, PageCell, PageDrawing, PageList, PagePicture, PageSection, PageTable, PageText, Standing } from "../../generated/view";
+import { createContext } from "preact";
+import { useContext, useEffect, useRef } from "preact/hooks";
+import type { PageBlock, PageCell, PageDrawing, PageList, PagePicture, PageSection, PageSource, PageTable, PageText, Standing } from "../../generated/view";
 import { Icon, type IconName } from "../../shell/icons";
 import { mountPlan } from "./figure_plan";
 import { mountPlot } from "./figure_plot";
 import { isLink } from "./links";
+import { moment } from "../../time/format";
 
 /** Goes to a time of the run; absent on a page without one. */
 export type Seek = ((t: number) => void) | undefined;
+
+/** The page's time, ns: what had not run by then has not yet. */
+export const BY_NOW = createContext(Infinity);
 
 const SIGNS: Readonly<Record<Exclude<Standing, "">, readonly [IconName, string]>> = { passed: ["met", "passed"], failed: ["missed", "failed"], open: ["open", "not judged"] };
 
@@ -28,6 +33,7 @@ function Block({ block, seek }: { block: PageBlock; seek: Seek }) {
     case "list": return <List block={block} seek={seek} />;
     case "text": return <Text block={block} />;
     case "picture": return <Picture block={block} />;
+    case "source": return <Source block={block} seek={seek} />;
     case "drawing": return <Drawing block={block} />;
     case "plot": return <Mounted mount={(host) => mountPlot(host, block)} />;
     case "plan": return <Mounted mount={(host) => mountPlan(host, block)} />;
@@ -63,6 +69,34 @@ function List({ block, seek }: { block: PageList; seek: Seek }) {
 function Text({ block }: { block: PageText }) {
   const title = block.title && <h3>{block.title}</h3>;
   return block.is_listing ? <>{title}<pre tabIndex={0} role="group" aria-label={block.title || "Listing"}>{block.text}</pre></> : <>{title}<p class="prose">{block.text}</p></>;
+}
+
+/** What a line has come to: a class, and words. */
+const RAN = { none: "", ran: "has run", part: "has run, one of its branches always the same way", not: "has not run" } as const;
+
+function Source({ block, seek }: { block: PageSource; seek: Seek }) {
+  const now = useContext(BY_NOW), oneWay = new Set(block.one_way);
+  const state = (n: number): keyof typeof RAN => {
+    const at = block.ran_ns[n] ?? -2;
+    if (at === -2) return "none";
+    if (at === -1 || at > now) return "not";
+    return oneWay.has(block.first + n) ? "part" : "ran";
+  };
+  return (
+    <figure class="source">
+      <figcaption>{block.title}</figcaption>
+      <div class="lines" tabIndex={0} role="group" aria-label={block.title}><ol>
+        {block.lines.map((line, n) => {
+          const kind = state(n), number = block.first + n, at = block.ran_ns[n] ?? -2, isNext = number === block.next;
+          return (
+            <li class={isNext ? `${kind} next` : kind} {...(at > 0 && seek ? { onClick: () => seek(at), title: `${RAN[kind]}; first at ${moment(at, 1e3)}` } : { title: RAN[kind] })}>
+              <span class="mark"><span class="unseen">{RAN[kind]}</span></span><span class="number">{isNext ? `→ ${number}` : number}</span><code>{line || " "}</code>
+            </li>
+          );
+        })}
+      </ol></div>
+    </figure>
+  );
 }
 
 function Picture({ block }: { block: PagePicture }) {

@@ -1,67 +1,40 @@
-// Checks of what no run of the self-test exercises: the codes over a restart, the LED, the mode button, numbers as text, faults of settings, gaps,
-// the origin, a client to which nobody listens.
+// Checks of what no run of the self-test exercises: the codes over a restart, the mode button, numbers as text, gaps,
+// the origin, a client to which nobody listens; console.cpp: every line of the console; parts.cpp: single functions.
 //
 // Prints each broken claim; ends with `ok` and exit code 0, or with 1.
 
 #include <cstdio>
 #include <cstring>
+#include <initializer_list>
 
-#include "../core/adapter/fields.hpp"
-#include "../core/adapter/inputs.hpp"
-#include "../core/app/code_keeper.hpp"
-#include "../core/app/led.hpp"
-#include "../core/app/mode_button.hpp"
-#include "../core/app/runner.hpp"
-#include "../core/app/text.hpp"
-#include "robot.hpp"
+#include "../../core/adapter/inputs.hpp"
+#include "../../core/app/code_keeper.hpp"
+#include "../../core/app/mode_button.hpp"
+#include "../../core/app/runner.hpp"
+#include "../../core/app/text.hpp"
+#include "../robot.hpp"
+#include "claims.hpp"
 
 namespace {
 
 using adapter::Master;
-using adapter::Settings;
 using adapter::State;
 using p2os::Nanos;
 using p2os::NS_PER_MS;
 using p2os::NS_PER_S;
 
-int broken = 0;
-
-void claim(bool holds, const char* what) {
-  if (!holds) {
-    std::printf("broken: %s\n", what);
-    ++broken;
-  }
-}
-
-//: Times that the LED comes on within a period.
-int flashes(State state, Master master = Master::BLUEPILL) {
-  int count = 0;
-  bool before = app::led_is_on(state, master, app::LED_PERIOD_NS - NS_PER_MS);
-  for (Nanos at = 0; at < app::LED_PERIOD_NS; at += NS_PER_MS) {
-    const bool is_on = app::led_is_on(state, master, at);
-    count += is_on && !before ? 1 : 0;
-    before = is_on;
-  }
-  return count;
-}
-
-void check_led() {
-  claim(flashes(State::RESET) == 0 && !app::led_is_on(State::BOOTING, Master::BLUEPILL, 0), "dark until the boot");
-  claim(flashes(State::IDLE) == 1, "idle is one flash");
-  claim(flashes(State::CONNECTING) == 2, "connecting is two");
-  claim(flashes(State::SETTLING) == 3, "settling is three");
-  claim(flashes(State::CLOSING) == 4, "closing is four");
-  claim(flashes(State::DRIVING) == 0 && app::led_is_on(State::DRIVING, Master::BLUEPILL, 0), "driving is on");
-  claim(flashes(State::DRIVING, Master::PAD) == 1, "driving by the pad has one gap");
-  claim(flashes(State::LOST) == 20, "lost flickers ten times a second");
-}
+using units::broken;
+using units::claim;
+using units::Page;
+using units::ROBOT;
+using units::WIRES;
 
 void check_button() {
   app::ModeButton held;
   claim(!held.take(true, 0) && !held.take(true, NS_PER_S), "a button held from the start does not count");
   app::ModeButton button;
   button.take(false, 0);
-  claim(!button.take(true, 49 * NS_PER_MS), "49 ms do not count");
+  claim(!button.take(true, 50 * NS_PER_MS - 1), "a nanosecond less than 50 ms does not count");
   claim(button.take(true, 50 * NS_PER_MS), "50 ms do");
   claim(!button.take(true, 2 * NS_PER_S), "and only once");
   button.take(false, 2 * NS_PER_S);
@@ -69,15 +42,6 @@ void check_button() {
   button.take(false, 2 * NS_PER_S + 31 * NS_PER_MS);
   claim(!button.take(true, 2 * NS_PER_S + 60 * NS_PER_MS), "a bounce begins anew");
 }
-
-class Page final : public app::Writer {
- public:
-  void write(const char* text) override { std::strncat(text_, text, sizeof text_ - std::strlen(text_) - 1); }
-  bool is(const char* text) const { return std::strcmp(text_, text) == 0; }
-
- private:
-  char text_[64] = {};
-};
 
 void check_numbers() {
   Page page;
@@ -87,34 +51,10 @@ void check_numbers() {
   claim(page.is("-922337203685477580809223372036854775807"), "the ends of 64 bits are written");
   std::int64_t value = 0;
   claim(app::read_number("-42", value) && value == -42, "a number is read");
-  for (const char* text : {"", "-", "4x", "0x10", " 4", "1234567890123456789", "--1"}) {
+  claim(app::read_number("0987654321", value) && value == 987'654'321, "all ten digits are");
+  claim(app::read_number("999999999999999999", value) && value == 999'999'999'999'999'999, "18 digits fit");
+  for (const char* text : {"", "-", "4x", "0x10", " 4", "1234567890123456789", "--1", "1/", "1:", "/", ":"}) {
     claim(!app::read_number(text, value), text);
-  }
-}
-
-//: The fault that one value leaves the settings with.
-const char* fault_with(const char* name, std::int64_t value) {
-  Settings settings;
-  adapter::setting(adapter::find_setting(name)).set(settings, value);
-  return adapter::fault_of(settings, {});
-}
-
-void check_faults() {
-  claim(adapter::fault_of(Settings{}, {}) == nullptr, "the defaults are sound");
-  const struct {
-    const char* name;
-    std::int64_t least, most;
-  } ranges[] = {
-      {"sample_period_ns", NS_PER_MS / 10, 3'600 * NS_PER_S}, {"pulse_ns", 10 * NS_PER_MS, 3'600 * NS_PER_S},
-      {"liveness_ns", 1, 3'600 * NS_PER_S},                    {"pair_spacing_ns", NS_PER_MS, 200 * NS_PER_MS},
-      {"bit_order", 0, 1},                                     {"sample_count", 1, 31},
-      {"pad_velocity_mm_s", 0, 65'535},                        {"pad_stick_dead", 0, 510},
-      {"step_um_per_s", 0, 10'000'000},
-  };
-  for (const auto& range : ranges) {
-    claim(fault_with(range.name, range.least) == nullptr && fault_with(range.name, range.most) == nullptr, range.name);
-    claim(fault_with(range.name, range.least - 1) != nullptr, range.name);
-    claim(fault_with(range.name, range.most + 1) != nullptr, range.name);
   }
 }
 
@@ -130,8 +70,17 @@ void check_duties() {
 
   meter.restart(false);
   claim(meter.duty(50 * NS_PER_MS) == 0, "a wire that is low has no duty");
+  meter.edge(true, 50 * NS_PER_MS, 20'000);
+  claim(meter.duty(50 * NS_PER_MS) == 0, "one rising edge is no period yet");
   meter.restart(true);
-  claim(meter.duty(50 * NS_PER_MS) == 1'000, "one that is high has all of it");
+  claim(meter.duty(200 * NS_PER_MS) == 1'000, "one that is high has all of it");
+  meter.edge(false, 200 * NS_PER_MS, 30'000);
+  meter.edge(true, 201 * NS_PER_MS, 31'000);
+  claim(meter.duty(201 * NS_PER_MS) == 1'000, "nor is the first after a level");
+  meter.edge(true, 201 * NS_PER_MS, 31'000);
+  meter.edge(false, 201 * NS_PER_MS, 31'000);
+  meter.edge(true, 201 * NS_PER_MS, 31'000);
+  claim(meter.duty(201 * NS_PER_MS) == 1'000, "edges of one instant leave it");
 
   adapter::DutyMeter wraps(25 * NS_PER_MS);
   const std::uint32_t stamps[] = {0xFFFF'FF00U, 0xFFFF'FF80U, 0x100U};
@@ -200,7 +149,7 @@ struct Connecting {
   StandingClock clock;
   Recorder uart;
   HeldPins pins;
-  adapter::Adapter part{{}, {}, {}, 0};
+  adapter::Adapter part{{}, ROBOT, WIRES, 0};
   app::Runner runner{part, clock, uart, nullptr};
 };
 
@@ -245,7 +194,7 @@ void check_a_gap_between_two_frames() {
   StandingClock clock;
   Robotic uart(clock);
   HeldPins pins;
-  adapter::Adapter part{{}, {}, {}, 0};
+  adapter::Adapter part{{}, ROBOT, WIRES, 0};
   part.attach(&pins, nullptr, nullptr);
   app::Runner runner{part, clock, uart, nullptr};
   pins.word = 1U << 6 | 2U << 3 | 2U;
@@ -308,7 +257,7 @@ void check_gaps() {
   sleepy.turn();
   claim(awake.uart.kinds[3] == 0 && sleepy.has_stopped(), "what was due before a gap within the pass stays unsaid");
 
-  adapter::Adapter off({}, {}, {}, 0);
+  adapter::Adapter off({}, ROBOT, WIRES, 0);
   off.skip_to("gap", 150 * NS_PER_MS);
   claim(off.state() == State::BOOTING, "a gap in the boot is a longer boot");
 }
@@ -337,16 +286,26 @@ class OneNumber final : public app::Store {
 
 //: An adapter that has just started, as the keeper placed it.
 adapter::Wheels restored(app::RetainedWheels& memory, app::Store& store) {
-  adapter::Adapter part({}, {}, {}, 0);
+  adapter::Adapter part({}, ROBOT, WIRES, 0);
   app::CodeKeeper(memory, store).restore(part);
   return part.wheel_phases_um();
+}
+
+//: Memory whose check is right; FNV-1a, written anew.
+app::RetainedWheels with_check(std::int64_t left_um, std::int64_t right_um) {
+  std::uint32_t hash = 2'166'136'261U;
+  for (int place = 0; place < 16; ++place) {
+    const auto number = static_cast<std::uint64_t>(place < 8 ? left_um : right_um);
+    hash = (hash ^ static_cast<std::uint8_t>(number >> place % 8 * 8)) * 16'777'619U;
+  }
+  return {left_um, right_um, hash};
 }
 
 void check_codes() {
   using adapter::Wheels;
   app::RetainedWheels memory{1, 2, 3};
   OneNumber store;
-  adapter::Adapter part({}, {}, {}, 0);
+  adapter::Adapter part({}, ROBOT, WIRES, 0);
   const Wheels unknown = part.wheel_phases_um();
   claim(part.counts() == Wheels{0, 4} && part.counts_shown() == Wheels{0, 4}, "a new one has the code of its released wires");
   claim(restored(memory, store) == unknown, "so has what nobody has kept");
@@ -356,6 +315,7 @@ void check_codes() {
   keeper.restore(part);
   part.place_wheels({70'000, 518'000});
   keeper.keep(part, 0);
+  claim(memory.check == 0x2F50'FA45, "FNV-1a of both numbers, the lowest byte first");
   claim(part.counts() == Wheels{1, 7} && part.counts_shown() == Wheels{1, 7}, "a code is the eighth of its turn");
   claim(restored(memory, store) == Wheels{70'000, 518'000}, "a restart goes on where it was");
   keeper.keep(part, app::CodeKeeper::STANDS_NS - 1);
@@ -374,6 +334,24 @@ void check_codes() {
   memory.check = 0;
   store.save("", -1);
   claim(restored(memory, store) == unknown, "but a negative one");
+  // 2^31 - 1 um are 4142 turns of 518362.788 um and 424979.1 um.
+  constexpr std::int64_t LONGEST = 0x7FFF'FFFF, LAST_IN_ITS_TURN = 424'979;
+  for (const bool is_left : {true, false}) {
+    for (const std::int64_t phase : {LONGEST, LONGEST + 1, std::int64_t{-1}}) {
+      app::RetainedWheels other{};
+      OneNumber empty;
+      adapter::Adapter source({}, ROBOT, WIRES, 0);
+      app::CodeKeeper(other, empty).restore(source);
+      other = with_check(is_left ? phase : 5, is_left ? 5 : phase);
+      const Wheels found = restored(other, empty);
+      const Wheels wanted = is_left ? Wheels{LAST_IN_ITS_TURN, 5} : Wheels{5, LAST_IN_ITS_TURN};
+      claim(found == (phase == LONGEST ? wanted : unknown), "a phase is 0 to 2^31 - 1");
+      other.check = 0;
+      const std::uint64_t left = static_cast<std::uint64_t>(is_left ? phase : 5);
+      empty.save("", static_cast<std::int64_t>(left << 32 | (static_cast<std::uint64_t>(is_left ? 5 : phase) & 0xFFFF'FFFF)));
+      claim(restored(other, empty) == (phase == LONGEST ? wanted : unknown), "in the store too");
+    }
+  }
 }
 
 //: A sound frame of the robot, whose payload is its kind and zeros, but for one byte that is 1.
@@ -452,6 +430,21 @@ void check_client() {
   claim(client.stats().frames_received == 6 && client.stats().malformed == 1, "packets are counted, heard or not");
   client.advance_to(opened_at + p2os::LIVENESS_NS);
   claim(client.state() == p2os::ClientState::LOST, "and silence ends it");
+  const auto says = [&client, &frame](std::initializer_list<std::uint8_t> kinds) {
+    bool is_so = true;
+    for (const std::uint8_t kind : kinds) {
+      is_so = client.take_output(frame) && frame.bytes()[3] == kind && is_so;
+    }
+    return is_so && !client.take_output(frame);
+  };
+  taken();
+  const Nanos lost_at = opened_at + p2os::LIVENESS_NS;
+  client.connect(lost_at);
+  claim(client.state() == p2os::ClientState::RECOVERING && says({29, 11, 2}), "a lost robot is stopped and closed first");
+  client.advance_to(lost_at + p2os::CLOSE_WAIT_NS - 1);
+  claim(says({}), "that takes 200 ms");
+  client.advance_to(lost_at + p2os::CLOSE_WAIT_NS);
+  claim(client.state() == p2os::ClientState::SYNC0 && says({29, 11, 21, 0}), "then it is asked for its SYNC0");
   for (const std::uint8_t kind : {std::uint8_t{0xFD}, std::uint8_t{0xFE}, std::uint8_t{0xFF}}) {
     p2os::Client other({});
     other.receive(Packet(kind, 1).bytes(), open(other));
@@ -464,14 +457,14 @@ void check_client() {
 int main() {
   check_client();
   check_codes();
-  check_led();
   check_button();
   check_numbers();
-  check_faults();
   check_duties();
   check_gaps();
   check_a_gap_between_two_frames();
   check_origin();
+  units::check_console();
+  units::check_parts();
   if (broken == 0) {
     std::puts("ok");
   }

@@ -1,0 +1,131 @@
+"""A long run that was kept beside its trace: shown as its trace shows it, or not at all."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from p2os.view.header import (
+    PageBlock,
+    PageCell,
+    PageCurve,
+    PageDrawing,
+    PageHeader,
+    PageList,
+    PagePicture,
+    PagePlan,
+    PagePlot,
+    PageSection,
+    PageTable,
+    PageText,
+    PanelHeader,
+    PictureShape,
+    WorldHeader,
+    WorldThing,
+)
+from p2os.view.recording import ViewRecording
+from robot_bench.cli.shown.targets import run_target
+from robot_bench.recording.run_folder import KEPT_NAME
+from robot_bench.recording.run_record import read_run
+from robot_bench.report.run_page import run_report
+from robot_bench.run import run_scenario
+from robot_bench.scenario.loading import load_scenario
+from robot_bench.view.kept_recording import LEAST_BYTES, is_long, keep, kept
+
+FENCE = WorldThing(name="k", kind="wall", shape="polygon", x_m=0.0, y_m=0.0, points=((0.0, 1.0), (2.0, 3.0)))
+BLOCKS: list[PageBlock] = [
+    PageTable(title="t", head=("a", "b"), rows=[[PageCell(text="1", is_number=True, at_ns=5)]]),
+    PageText(text="x"),
+    PageList(items=[PageCell(text="y", standing="failed")]),
+    PagePicture(png="eA=="),
+    PagePlot(curves=[PageCurve(name="c", x=(1.0, 2.0), y=(3.0, 4.0))], marks=(0.5,)),
+    PagePlan(world=WorldHeader(name="w", extent_m=(0.0, 0.0, 1.0, 1.0), things=[FENCE]), hits=((1.0, 2.0),),
+             places=((1.0, 2.0, "here"),)),
+    PageDrawing(shapes=[PictureShape(kind="box", x=1.0, y=2.0)]),
+]  # fmt: skip
+SECTIONS = [PageSection(title="s", blocks=BLOCKS)]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a run of some seconds, through adapter and P2OS."""
+    scenario = load_scenario("motors").with_options(body="kinematic", mode="adapter", duration_s=3.0)
+    return run_scenario(scenario, tmp_path_factory.mktemp("run") / "run").folder
+
+
+def rows_of(recording: ViewRecording) -> dict[int, str]:
+    return {track.header.id: str([[*map(str, values)] for values in track.columns]) for track in recording.tracks}
+
+
+def test_what_is_kept_of_a_run_is_what_its_trace_shows(folder: Path) -> None:
+    whole = run_report(read_run(folder))
+    assert any(track.kind.name == "packets" and len(track) > 20 for track in whole.tracks)
+    assert keep(whole, folder, SECTIONS)
+    found = kept(folder)
+    assert found is not None
+    assert rows_of(found) == rows_of(whole)
+    wanted = replace(whole.full_header, sections=SECTIONS).as_json()
+    assert json.dumps(found.full_header.as_json()) == json.dumps(wanted)
+    target = run_target(str(folder))
+    assert target is not None
+    assert target.run is None
+    assert target.source.recording.header == found.header
+
+
+@pytest.mark.parametrize("what", ["byte", "end", "trace", "version", "head"])
+def test_what_was_kept_of_another_run_or_is_damaged_is_not_shown(
+    folder: Path, tmp_path: Path, what: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    keep(run_report(read_run(folder)), folder)
+    for name in ("trace.jsonl", KEPT_NAME):
+        (tmp_path / name).write_bytes((folder / name).read_bytes())
+    assert kept(tmp_path) is not None
+    path = tmp_path / KEPT_NAME
+    data = bytearray(path.read_bytes())
+    if what == "byte":
+        data[len(data) // 2] ^= 1
+    elif what == "end":
+        del data[-8:]
+    elif what == "trace":
+        with (tmp_path / "trace.jsonl").open("a") as trace:
+            trace.write('{"k": "later"}\n')
+    elif what == "version":
+        monkeypatch.setattr("simbase.__version__", "0.0.1")
+    else:
+        del data[data.index(b"\n") :]
+    path.write_bytes(data)
+    assert kept(tmp_path) is None
+    target = run_target(str(tmp_path))
+    assert target is not None
+    assert target.run is not None
+
+
+def test_a_run_that_was_read_is_kept_for_the_next_time(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (folder / KEPT_NAME).unlink(missing_ok=True)
+    monkeypatch.setattr("robot_bench.view.kept_recording.LEAST_BYTES", 0)
+    target = run_target(str(folder))
+    assert target is not None
+    assert target.run is not None
+    target.run()
+    target.source.update()
+    found = kept(folder)
+    assert found is not None
+    assert len(found.header.sections) == len(target.source.recording.header.sections) > 1
+
+
+def test_a_short_run_is_not_worth_it_and_a_folder_that_cannot_be_written_stays_as_it_is(tmp_path: Path) -> None:
+    recording = ViewRecording(PageHeader(title="x", panels=[PanelHeader(name="p", title="P")]))
+    trace = tmp_path / "trace.jsonl"
+    trace.write_bytes(bytes(LEAST_BYTES - 1))
+    assert not is_long(tmp_path)
+    trace.write_bytes(bytes(LEAST_BYTES))
+    assert is_long(tmp_path)
+    assert keep(recording, tmp_path)
+    found = kept(tmp_path)
+    assert found is not None
+    assert (found.header, found.tracks) == (replace(recording.header, panels=(PanelHeader(name="p", title="P"),)), [])
+    (tmp_path / KEPT_NAME).unlink()
+    (tmp_path / KEPT_NAME).mkdir()
+    assert not keep(recording, tmp_path)
+    assert kept(tmp_path) is None
