@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from bluepill_sim.board import BluePill
-from bluepill_sim.cli import viewing
-from bluepill_sim.cli.viewing import ViewedRun
+from bluepill_sim.cli.browser import viewing
+from bluepill_sim.cli.browser.viewing import ViewedRun
 from bluepill_sim.fabric.subscriptions import EDGE
 from bluepill_sim.parts.registry import parse_part
 from p2os.cli.main import run as p2os
