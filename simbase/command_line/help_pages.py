@@ -33,10 +33,10 @@ class VerbPage(TyperCommand):
     def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:  # type: ignore[override]  # typer's own class
         """Insert values that are usual."""
         filled = []
-        for word, following in zip(args, [*args[1:], ""], strict=True):
+        for place, word in enumerate(args):
             filled.append(word)
             if word in self.usual:
-                filled += self.usual[word](following)
+                filled += self.usual[word](args[place + 1] if place + 1 < len(args) else "")
         return super().parse_args(ctx, filled)
 
     def format_help_text(self, ctx: typer.Context, formatter) -> None:  # type: ignore[no-untyped-def, override]  # noqa: ANN001 - click's or typer's own
