@@ -9,6 +9,7 @@ from typing import Annotated, ClassVar, Protocol
 import typer
 
 from bluepill_sim.board import BluePill, run_until
+from bluepill_sim.cli.browser.viewing import ViewedRun, view_run
 from bluepill_sim.cli.can_socket import join_can
 from bluepill_sim.cli.console import PTY, connect, open_console, open_traces
 from bluepill_sim.cli.driving import (
@@ -23,7 +24,6 @@ from bluepill_sim.cli.driving import (
 )
 from bluepill_sim.cli.parts import attach_parts, show_parts
 from bluepill_sim.cli.quantities import Firmware, option, time_option
-from bluepill_sim.cli.viewing import ViewedRun, view_run
 from bluepill_sim.core.halts import ChipReached
 from bluepill_sim.parts.registry import parse_part
 from simbase.command_line.gdb_option import GDB_PORT, usual_port

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from bluepill_sim.cli.viewing import ViewedRun
+from bluepill_sim.cli.browser.viewing import ViewedRun
 from p2os.cli.captures.shown_page import shown
 from robot_bench.bench import Bench
 from robot_bench.bench.lone_board import board_scenario

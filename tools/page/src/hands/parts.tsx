@@ -107,19 +107,19 @@ export function Board({ app }: { app: App }) {
 }
 
 export function Done({ app }: { app: App }) {
-  const run = app.store.run.value!, left = run.hand_count - run.hands.length;
+  const run = app.store.run.value!, left = run.hand_count - run.hands.length, isScenario = app.store.header.value.world !== null; // a board by itself is none
   return (
     <section class="hand-part" aria-label="What was done">
       <div class="one-line">
         <h2 class="grow">{`Done by hand: ${run.hand_count}`}</h2>
-        <button type="button" disabled={!run.hand_count} onClick={() => app.ask({ do: "save", words: "scenario" })}>Save as scenario</button>
-        <button type="button" disabled={!run.hand_count} onClick={() => app.ask({ do: "save", words: "test" })}>Save as test</button>
+        {isScenario && <button type="button" disabled={!run.hand_count} onClick={() => app.ask({ do: "save", words: "scenario" })}>Save as scenario</button>}
+        {isScenario && <button type="button" disabled={!run.hand_count} onClick={() => app.ask({ do: "save", words: "test" })}>Save as test</button>}
       </div>
       <p class="said saved" role="status">{run.saved}</p>
       {left > 0 && <p class="faint">{`${left} earlier`}</p>}
       {run.hands.length > 0 ? <ol class="plain-list">{run.hands.map((one) => (
         <li><button type="button" class="link" onClick={() => app.clock.seek(one.at_ns)}>{moment(one.at_ns, 1e3)}</button><span class="grow">{one.words}</span></li>
-      ))}</ol> : <p class="faint">Whatever is done is recorded with its time: the run can be run again with it, without this page.</p>}
+      ))}</ol> : <p class="faint">{isScenario ? "Whatever is done is recorded with its time: the run can be run again with it, without this page." : "Whatever is done is listed with its time, and comes again where the run goes back."}</p>}
     </section>
   );
 }

@@ -8,7 +8,7 @@ import { Board, Done, Faults, Things } from "./parts";
 
 export const hands: ViewKind = {
   id: "hands", title: "Hands", doc: "Drive the robot, move and make things, press, type, turn voltages, put faults: each with its time, to be run again.",
-  has: (store) => store.header.value.hands !== null && store.mayControl.value,
+  has: ({ header, mayControl }) => header.value.hands !== null && mayControl.value && !(header.value.hands.is_real && header.value.hands.most_mps === 0), // STOP alone stands in the bar
   mount: (app, host) => {
     render(<Hands app={app} driving={new Driving(app)} />, host);
     return () => render(null, host);
@@ -20,7 +20,7 @@ function Hands({ app, driving }: { app: App; driving: Driving }) {
   return (
     <div class="hands" tabIndex={0} role="region" aria-label="What hands can do">
       {offer.most_mps > 0 && <Drive app={app} driving={driving} />}
-      {offer.is_real ? <button type="button" class="stop" onClick={() => app.stop()}>STOP</button> : <><Things app={app} /><Faults app={app} /><Board app={app} /><Done app={app} /></>}
+      {offer.is_real ? <button type="button" class="stop" onClick={() => app.stop()}>STOP</button> : <>{app.store.header.value.world && <Things app={app} />}<Faults app={app} /><Board app={app} /><Done app={app} /></>}
     </div>
   );
 }
