@@ -14,8 +14,8 @@
     esp32-windows  the same for the ESP32's processor: its instructions and windowed calls, by LLVM; to be linked and
                measured, not to be run: it has no handler for the exception of MOVSP
 
-Prints how much flash and RAM the core alone takes. An image of the ESP32 cannot be
-built here: ESP-IDF wants a compiler and a C library of its own (docs/adapter-firmware.md, Builds).
+Prints how much flash and RAM the core alone takes. ESP-IDF builds the image of an ESP32
+(docs/adapter-firmware.md, Builds).
 """
 
 import argparse

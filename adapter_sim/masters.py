@@ -61,8 +61,8 @@ class Masters(Stateful):
     def sample(self, now: Nanos) -> tuple[bool, bool]:
         """Sample the pins; tell whether speeds may have changed, and whether the connect request has just ended."""
         motors_changed, connect_changed = self.inputs.sample(now)
-        is_master = self.master is Master.BLUEPILL
-        return is_master and motors_changed, is_master and connect_changed and not self.inputs.wants_robot
+        has_ended = connect_changed and not self.inputs.wants_robot
+        return motors_changed, has_ended and self.master is Master.BLUEPILL
 
     def take_pad(self, report: PadReport, now: Nanos) -> bool:
         """Take a report; tell whether it ended the connect request."""

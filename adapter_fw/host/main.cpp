@@ -181,7 +181,7 @@ int main(int count, char** words) {
   }
   catch_signals();
   host::FileStore store(options.settings);
-  host::Wires wires({});
+  host::Wires wires(board::WIRES);
   if (!options.wires.empty() && !wires.listen(options.wires)) {
     return refuse(wires.error(), "a path that does not exist yet");
   }

@@ -53,8 +53,9 @@ def test_the_image_and_the_model_send_the_same_frames_at_the_same_times() -> Non
 
 
 @pytest.mark.soak
-def test_the_image_and_the_model_are_the_same_over_a_hundred_lives() -> None:
-    assert sum(map(live, range(100))) > 5_000
+@pytest.mark.parametrize("seeds", [range(first, first + 10) for first in range(0, 100, 10)], ids=str)
+def test_the_image_and_the_model_are_the_same_over_a_hundred_lives(seeds: range) -> None:
+    assert sum(map(live, seeds)) > 500
 
 
 @pytest.mark.slow

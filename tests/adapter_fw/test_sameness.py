@@ -206,6 +206,18 @@ def test_the_last_frames_that_fit_are_kept_where_nobody_takes_any() -> None:
     assert firmware.take_output() == []
 
 
+@pytest.mark.parametrize(("left", "right", "state"), [(750, 750, "driving"), (751, 750, "lost"), (750, 751, "lost")])
+def test_both_read_each_wheel_to_a_millimetre_a_second_at_full_speed(left: int, right: int, state: str) -> None:
+    sequence = Sequence(AdapterSettings(step_um_per_s=250_000, plausibility_tolerance_mm_s=0), has_four_bits=False)
+    sequence.step("connect", False)
+    sequence.step("motors", 3, 3)
+    for _ in range(12):
+        sequence.twins.send_sip(raw_left_velocity=left, raw_right_velocity=right)
+        sequence.twins.pass_time(100 * MS)
+    assert sequence.twins.model.status.speeds.forward_mm_s == (750 if state == "driving" else 0)
+    assert sequence.twins.model.state == sequence.twins.firmware.state == state
+
+
 def test_both_try_every_line_speed_in_turn_up_to_the_eighth() -> None:
     bauds = (9_600, 19_200, 38_400, 57_600, 115_200, 230_400, 460_800, 921_600)
     twins = Twins(AdapterSettings(bauds=bauds), waits_for_edges=True)

@@ -268,3 +268,5 @@ def test_inputs_that_measure_are_sampled_without_an_edge() -> None:
     rig.adapter.samples.waits_for_edges = True
     rig.run(330 * MS)
     assert rig.adapter.wakes_on == {"rst"}
+    signs_and_magnitudes = {f"motor{number}_comm{bit}" for number in (1, 2) for bit in (1, 3)}
+    assert rig.adapter.inputs.wires == {"rst", "p2dx_con", *signs_and_magnitudes}

@@ -39,8 +39,19 @@ def test_it_does_the_same_with_sampling_suspended(steps: list[tuple[str, int, in
     assert story(steps, suspends=True) == story(steps, suspends=False)
 
 
+def test_bytes_that_come_while_the_wires_are_settled_make_it_sample_no_more() -> None:
+    rig = Rig()
+    rig.connect()
+    rig.adapter.wait_for_edges()
+    rig.ms(50)
+    assert "p2dx_con" in rig.adapter.wakes_on
+    rig.adapter.receive(b"\x00", rig.now)
+    assert "p2dx_con" in rig.adapter.wakes_on
+
+
 def test_a_clock_is_suspended_over_whole_periods() -> None:
     clock = SampleClock(2 * MS)
+    assert clock.due(5) == 0, "it begins with a sample"
     clock.after(3 * MS)
     clock.was_quiet(5 * MS)
     assert clock.due(50 * MS) == 7 * MS, "it samples on while nobody promises edges"

@@ -291,13 +291,12 @@ void Adapter::sample(Nanos now) {
   const std::uint32_t connect_bit = 1U << (reset_bit_ - 1);
   const bool motors_changed = take_motors(word & (connect_bit - 1), now);
   const bool connect_changed = connect_.take((word & connect_bit) != 0, now);
-  if (master_ == Master::BLUEPILL) {
-    if (motors_changed && state_ == State::DRIVING) {
-      pacer_.want(wanted_speeds());
-    }
-    if (connect_changed && !wants_robot()) {
-      end_request("p2dx_con is low", now);
-    }
+  // Of the master, whoever it is: a pad wants what it wanted before.
+  if (motors_changed && state_ == State::DRIVING) {
+    pacer_.want(wanted_speeds());
+  }
+  if (connect_changed && master_ == Master::BLUEPILL && !wants_robot()) {
+    end_request("p2dx_con is low", now);
   }
   if (state_ == State::LOST && !wants_robot()) {
     enter(State::IDLE, now, What::IDLE, "ready for a new connection");

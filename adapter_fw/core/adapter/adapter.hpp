@@ -56,7 +56,8 @@ struct Agenda {
   Nanos settle_at = p2os::NEVER;
   //: SONAR 1 is sent again unless a reading comes before.
   Nanos sonar_at = p2os::NEVER;
-  Nanos stop_at = p2os::NEVER;
+  //: Of what is left of `stops_left`.
+  Nanos stop_at{};
   //: When bytes of the robot came last.
   Nanos received_at = 0;
   std::int32_t stops_left = 0;

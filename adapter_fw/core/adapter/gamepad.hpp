@@ -14,11 +14,11 @@ namespace adapter {
 
 //: One report of a pad, of whatever make.
 struct PadReport {
-  bool up = false;
-  bool down = false;
-  std::int32_t forward = 0;   // R2, 0 to TRIGGER_FULL
-  std::int32_t backward = 0;  // L2, likewise
-  std::int32_t turn = 0;      // right stick, -STICK_FULL - 1 (left) to STICK_FULL (right)
+  bool up;
+  bool down;
+  std::int32_t forward;   // R2, 0 to TRIGGER_FULL
+  std::int32_t backward;  // L2, likewise
+  std::int32_t turn;      // right stick, -STICK_FULL - 1 (left) to STICK_FULL (right)
 };
 
 class Gamepad {

@@ -30,11 +30,11 @@ bool is_same(const char* one, const char* other);
 
 //: A line cut into its words, in place.
 struct Words {
-  static constexpr std::size_t MOST = 4;
+  static constexpr std::size_t MOST = 3;
   const char* words[MOST] = {};
   std::size_t count = 0;
 
-  // Cuts a line at its blanks; words beyond the fourth are counted and left out.
+  // Cuts a line at its blanks; words beyond the third are counted and left out.
   explicit Words(char* line);
 };
 

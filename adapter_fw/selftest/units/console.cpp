@@ -209,6 +209,8 @@ void check_settings() {
 
 void check_status() {
   Desk desk;
+  const adapter::Adapter off({}, ROBOT, WIRES, 0);
+  claim(off.outputs().levels() == 0 && off.outputs().driven() == 0, "nothing is driven before the boot");
   selftest::Robot robot;
   desk.hardware.in = 1U << 6 | 1U << 3 | 3U;
   desk.part.receive({reinterpret_cast<const std::uint8_t*>("\xFA\xFB\x03\x01\x00\x00\xFA\xFB\x01zz"), 11}, desk.now);
