@@ -186,23 +186,16 @@ class Can(Peripheral):
             on_write="_write_flags",
         ),
         Register(name="TSR", offset=0x08, reset=0x1C00_0000, writable=0, on_write="_write_tsr", fields=_TRANSMISSION),
-        Register(
-            name="RF0R",
-            fields=_RECEPTION.format(n=0),
-            offset=0x0C,
-            readable=bits((4, 3), (1, 0)),
-            writable=0,
-            write_one_to_clear=bits((4, 3)),
-            on_write="_write_rf0r",
-        ),
-        Register(
-            name="RF1R",
-            fields=_RECEPTION.format(n=1),
-            offset=0x10,
-            readable=bits((4, 3), (1, 0)),
-            writable=0,
-            write_one_to_clear=bits((4, 3)),
-            on_write="_write_rf1r",
+        *(
+            Register(
+                name=f"RF{n}R",
+                fields=_RECEPTION.format(n=n),
+                offset=0x0C + 4 * n,
+                writable=0,
+                write_one_to_clear=bits((4, 3)),
+                on_write=f"_write_rf{n}r",
+            )
+            for n in range(2)
         ),
         Register(
             name="IER",

@@ -81,7 +81,7 @@ def _usart(number: int) -> RegisterWalk:  # noqa: C901 - a function a move
 
     def hear(w: RegisterWalker) -> None:
         data = [w.pick((0, 5, 0x55, 0x85, 0xFF, 0x105, w.number(512))) for _ in range(1 + w.number(3))]
-        data *= w.pick((1, 1, 1, 1, 1, 60))
+        data *= w.pick((*(1,) * 9, 20, 150))
         damage = ReceiveError(w.some(*ReceiveError)) if not w.number(3) else ReceiveError(0)
         w.note(f"hears {data} {damage.value}")
         w.part(name).receive(data, damage)

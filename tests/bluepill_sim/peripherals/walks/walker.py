@@ -102,7 +102,7 @@ class CountingSpiDevice(Stateful):
 
     STATE = ("sum", "is_exact")
     spi_modes = frozenset({0, 3})
-    max_hz = 36_000_000
+    max_hz = 12_000_000
 
     def __init__(self) -> None:
         self.sum, self.is_exact = 0, False
@@ -571,6 +571,7 @@ class RegisterWalker:
             self._drives = "".join(_LETTERS[pin.output] for pin in board.pins)
         yield "wires", self._wires
         yield "drives", self._drives
+        yield "routes", " ".join(f"{name} {route}" for name, route in board.chip.pins.remaps.items() if route)
         yield "memory", zlib.crc32(board.read_memory(BUFFER, BUFFER_BYTES) or b"")
         yield "warnings", " / ".join(board.warnings)
         yield "resets", " ".join(f"{cause.name} {count}" for cause, count in board.resets.items())
