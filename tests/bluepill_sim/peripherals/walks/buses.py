@@ -475,7 +475,7 @@ def _can_repeated(w: RegisterWalker) -> None:
     _can_send(w)
     w.run(w.pick((4_000_000, 6_000_000, 6_100_123)))
     w.run(w.pick((125, 100_000, 333_333)))
-    w.pick((_can_flags, _can_send, _can_unwired, _can_mode, _can_wire, _can_take))(w)
+    w.pick((_can_flags, _can_send, _can_unwired, _can_mode, _can_wire, _can_take, RegisterWalker.reset))(w)
 
 
 _CAN = RegisterWalk(
