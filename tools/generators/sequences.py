@@ -102,8 +102,8 @@ has walks since.
 A row asks one thing. What it leaves is found by walks (`tests/bluepill_sim/peripherals/walks`): each peripheral is
 driven at random from reset, in every mode, and all that can be seen after each step is a line: what was done and read,
 registers, edges and words that came out, lines inside the chip, when it acts next, routes, warnings. In every third
-episode a program makes the accesses, and in the middle of each another board goes on from a snapshot. They reach 99 % of
-the lines and 94 % of the branches of the devices in C in some seven seconds of a processor, and a checksum of each
+episode a program makes the accesses, and in the middle of each another board goes on from a snapshot. They reach 99 %
+of the lines and 94 % of the branches of the devices in C in some seven seconds of a processor, and a checksum of each
 episode is approved in `approved.json`. A walk says that a model does what it did, not
 that this is right: that is for rows and tests. Who changes a model writes the traces at both commits, reads the
 difference, and approves it with the change:

@@ -165,12 +165,13 @@ def _answer(word: int, at_ns: int) -> int:
 
 
 class CountingUsbHost(Stateful):
-    """What stands at the other end of a USB cable, counts what it is told, and acts each 0.7 ms of the first 7."""
+    """What stands at the other end of a USB cable, counts what it is told, and acts 0.7 ms after every fourth change."""
 
     STATE = ("sum", "next_ns")
 
     def __init__(self) -> None:
-        self.sum, self.next_ns = 0, None
+        self.sum = 0
+        self.next_ns: int | None = None
 
     def advance_to(self, now_ns: int) -> None:
         """Count."""
