@@ -165,7 +165,7 @@ def _answer(word: int, at_ns: int) -> int:
 
 
 class CountingUsbHost(Stateful):
-    """What stands at the other end of a USB cable, counts what it is told, and acts 0.7 ms after every fourth change."""
+    """The other end of a USB cable: counts what it is told, and acts 0.7 ms behind each fourth change."""
 
     STATE = ("sum", "next_ns")
 
