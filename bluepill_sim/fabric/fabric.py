@@ -400,8 +400,8 @@ class Fabric(Stateful):
     @property
     def lines(self) -> bytes:
         """The outputs that are 1 on each line, a bit each."""
-        level = self._calls_of_c.fabric_line
-        return bytes(level(self.handle, line) for line in range(LINES))
+        level, handle = self._calls_of_c.fabric_line, self.handle
+        return bytes([level(handle, line) for line in range(LINES)])
 
     @lines.setter
     def lines(self, levels: bytes) -> None:

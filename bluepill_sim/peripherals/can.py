@@ -186,23 +186,16 @@ class Can(Peripheral):
             on_write="_write_flags",
         ),
         Register(name="TSR", offset=0x08, reset=0x1C00_0000, writable=0, on_write="_write_tsr", fields=_TRANSMISSION),
-        Register(
-            name="RF0R",
-            fields=_RECEPTION.format(n=0),
-            offset=0x0C,
-            readable=bits((4, 3), (1, 0)),
-            writable=0,
-            write_one_to_clear=bits((4, 3)),
-            on_write="_write_rf0r",
-        ),
-        Register(
-            name="RF1R",
-            fields=_RECEPTION.format(n=1),
-            offset=0x10,
-            readable=bits((4, 3), (1, 0)),
-            writable=0,
-            write_one_to_clear=bits((4, 3)),
-            on_write="_write_rf1r",
+        *(
+            Register(
+                name=f"RF{n}R",
+                offset=0x0C + 4 * n,
+                writable=0,
+                write_one_to_clear=bits((4, 3)),
+                on_write=f"_write_rf{n}r",
+                fields=_RECEPTION.format(n=n),
+            )
+            for n in range(2)
         ),
         Register(
             name="IER",
@@ -329,7 +322,7 @@ class Can(Peripheral):
         return self.chip.now_ns
 
     @property
-    def bit_rate(self) -> Fraction | None:
+    def bit_rate(self) -> Fraction:
         """Bits a second."""
         return _bit_rate(self.chip.clocks.pclk1_hz, self.words[BTR])
 
@@ -454,8 +447,7 @@ class Can(Peripheral):
         self.plan()
 
     def on_reset(self) -> None:
-        """Drop everything; it stays on its network."""
-        self._settle()
+        """Drop everything, tries that C repeats too; it stays on its network."""
         for network in filter(None, (self._alone, self._joined)):
             network.forget(self)
         self.due_ns = None
@@ -487,8 +479,7 @@ class Can(Peripheral):
             status &= ~INAK
             self._sync_ns = None
         elif status & (INAK | SLAK) and (self._sync_ns is None):
-            rate = self.bit_rate or Fraction(1)
-            self._sync_ns = now_ns + int(_SYNC_BITS * NS_PER_S / rate)
+            self._sync_ns = now_ns + self._ns_of(_SYNC_BITS)
         self.words[MSR] = status
         self._connect()
         self._update()
@@ -498,7 +489,7 @@ class Can(Peripheral):
         """Leave initialisation or sleep after eleven bits at 1."""
         rx = self.chip.pins[self._pin_names[0]]
         if not self.words[BTR] & LBKM and not rx.level and not rx.is_floating:
-            self._sync_ns = now_ns + int(_SYNC_BITS * NS_PER_S / (self.bit_rate or Fraction(1)))
+            self._sync_ns = now_ns + self._ns_of(_SYNC_BITS)
             return
         if self.words[MSR] & INAK:
             self._timer_ns = now_ns
@@ -512,8 +503,11 @@ class Can(Peripheral):
             )
         self._want()
 
+    def _ns_of(self, bits: int) -> int:
+        return int(bits * NS_PER_S / self.bit_rate)
+
     def _recover(self, now_ns: Nanos) -> None:
-        self._recover_ns = now_ns + int(_RECOVERY_BITS * NS_PER_S / (self.bit_rate or Fraction(1)))
+        self._recover_ns = now_ns + self._ns_of(_RECOVERY_BITS)
 
     def _write_btr(self, _written: int, previous: int) -> None:
         if not self.words[MSR] & INAK:
@@ -712,14 +706,14 @@ class Can(Peripheral):
         """Return the 16-bit time of TTCM: bits since it left initialisation."""
         if not self.words[MCR] & TTCM:
             return 0
-        return int(max(at_ns - self._timer_ns, 0) * (self.bit_rate or 0) / NS_PER_S) & 0xFFFF
+        return int(max(at_ns - self._timer_ns, 0) * self.bit_rate / NS_PER_S) & 0xFFFF
 
     def _wake(self) -> None:
         """A frame has passed while it slept: with AWUM it leaves sleep."""
         self.words[MSR] |= WKUI
         if self.words[MCR] & AWUM:
             self.words[MCR] &= ~SLEEP
-            self._sync_ns = self.chip.now_ns + int(_SYNC_BITS * NS_PER_S / (self.bit_rate or Fraction(1)))
+            self._sync_ns = self.chip.now_ns + self._ns_of(_SYNC_BITS)
 
     # Errors and what is shown of it all.
 
@@ -867,7 +861,7 @@ class Can(Peripheral):
         if self.hears_itself:
             acts = _Part.IS_MUTE if self.words[BTR] & SILM else _Part.IS_ALONE
         is_flagged = error is not CanError.NONE and not sender.is_passive
-        rate = sender.bit_rate or self.bit_rate or Fraction(1)
+        rate = sender.bit_rate or self.bit_rate
         return _frame_rows(rate, frame, self.offer(start_ns), acts, error is CanError.NONE, is_flagged)
 
     # A frame that is tried over and over.

@@ -112,9 +112,9 @@ class I2cCall:
 
     #: 7 bits, 10 bits above 0x7F, 0 for the general call.
     address: int
-    written: bytes = b""
+    written: bytes
     #: How many bytes it reads, behind a repeated START if it has written.
-    read_bytes: int = 0
+    read_bytes: int
     #: How many of its addresses and bytes were acknowledged, and what it has read.
     acknowledged: int = 0
     read: bytes = b""

@@ -403,7 +403,7 @@ class Rcc(Peripheral):
     def stop(self) -> None:
         """Stop HSE and PLL, and take HSI: Stop mode begins, and HSI runs when that ends (RM0008 7.3.1, 7.3.2)."""
         self.words[CR] = self.words[CR] & ~(HSEON | HSERDY | PLLON | PLLRDY) | HSION | HSIRDY
-        self.words[CFGR] &= ~(_SW | _SW << 2)
+        self.words[CFGR] &= ~_SW
         self.native.ready_at[_HSI] = NO_TIME
         self._settle()
 
@@ -462,9 +462,11 @@ class Rcc(Peripheral):
         is_on = bool(self.words[BDCR] & _LSEON)
         for name, owner in (("PC14", "OSC32_IN"), ("PC15", "OSC32_OUT")):
             pin = self.chip.pins[name]
-            if is_on and pin.holder is None:
+            if is_on == (pin.holder == owner):
+                continue
+            if is_on:
                 pin.hold(owner)
-            elif not is_on and pin.holder == owner:
+            else:
                 pin.release()
 
     def _show_clock(self, *, is_stopped: bool = False) -> None:

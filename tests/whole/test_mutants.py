@@ -182,6 +182,8 @@ def test_the_nearest_tests_are_those_of_the_mirror_then_those_that_ran_the_line(
     walk, beside = by_name.of("bluepill_sim/extension/source/devices/tim.c", 1)[:2]
     assert walk == "tests/bluepill_sim/peripherals/walks/test_tim_walks.py"
     assert beside.startswith("tests/bluepill_sim/peripherals/tim")
+    of_no_name = by_name.of("bluepill_sim/extension/source/devices/listener.c", 1)
+    assert all(name.startswith("tests/bluepill_sim/peripherals/walks/") for name in of_no_name[:9])
     in_order = by_name.of("bluepill_sim/extension/source/interpreter/lower.c", 1)
     assert in_order[0].startswith("tests/bluepill_sim/core/interpreter/")
     ran = {"tests/whole/test_plugins.py": frozenset({7}), "tests/p2os/client/test_link.py": frozenset({8, 9})}

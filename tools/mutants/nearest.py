@@ -123,7 +123,7 @@ class Nearest:
         folders = next((tests for folder, tests in TESTS_OF_C.items() if path.startswith(f"{folder}/")), ())
         stem = {*Path(path).stem.split("_")}
         order = {
-            name: (not (near := stem & _words(name)), bool(near) and WHOLE not in _words(name), place)
+            name: (not stem & _words(name), WHOLE not in _words(name), place)
             for name in reversed(self._tests)
             for place, folder in reversed([*enumerate(folders)])
             if name == folder or name.startswith(f"{folder}/")

@@ -64,7 +64,8 @@ class SurveyedContact:
     stand_to_rest_s: float | None
     #: Share of the looks at which its centre slid.
     slide_share: float
-    #: Whether it slid, had a stall bit, or touched nothing at `DECIDED_S`, or was blocked so that the bit has its time.
+    #: Whether it slid, had a stall bit, or touched nothing at `DECIDED_S`; or was blocked, or did so until lately, as
+    #: where wheels spin before they are blocked, and is decided again within `STALL_S`.
     is_decided: bool
     #: The longest time, from `DECIDED_S` on, in which it touched and neither slid nor had a stall bit.
     undecided_s: float
@@ -131,7 +132,7 @@ def judged_states(
     decided = round(DECIDED_S / LOOK_S) - 1  # the first state is a look after the touch
     undecided = [
         state.in_contact and not slide and not stall for state, slide, stall in zip(states, slides, stalls, strict=True)
-    ][decided:]
+    ]
     turns = [state.turn_radps for state in states if abs(state.turn_radps) > TURNING_RADPS]
     rest = next((look for look in reversed(range(len(states))) if not rests[look]), -1) + 1
     stand_s = _first(stands)
@@ -153,12 +154,19 @@ def judged_states(
         rest_s=rest_s if rest < len(states) else None,
         stand_to_rest_s=None if stand_s is None else max(0.0, rest_s - stand_s),
         slide_share=sum(slides) / len(slides),
-        is_decided=not any(undecided[:1]) or blocked[decided],
-        undecided_s=_longest(undecided),
+        is_decided=blocked[decided] or _is_decided_lately(undecided, decided),
+        undecided_s=_longest(undecided[decided:]),
         sign_changes=sum(one * other < 0 for one, other in itertools.pairwise(turns)),
         energy=max(energies) / COMMAND_MPS**2,
         stop_s=_first(_rim(state) < RESTING_MPS for state in stopping),
     )
+
+
+def _is_decided_lately(undecided: Sequence[bool], look: int) -> bool:
+    """Tell whether a contact is decided at a look, or was until lately and is again within the time of a stall bit."""
+    before = next((n for n in range(look, -1, -1) if not undecided[n]), None)
+    behind = next((n for n in range(look, len(undecided)) if not undecided[n]), len(undecided))
+    return before is not None and (behind - before - 1) * LOOK_S <= STALL_S
 
 
 def _speed(states: Sequence[BodyState], look: int) -> float:

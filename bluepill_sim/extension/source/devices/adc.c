@@ -155,7 +155,7 @@ static void begin(struct device *device, uint32_t state, uint32_t delay)
     adc->state = state;
     adc->channel =
         state == REGULAR ? regular_channel(device, adc->regular_at) : injected_channel(device, adc->injected_at);
-    adc->has_sample = 0;
+    adc->has_sample = false;
     const uint64_t sampling = halves_of(device, adc->channel) - CONVERTING_HALVES;
     adc->cycles += (uint64_t)delay * adc->divider + sampling * adc->divider / 2;
     adc->sample_ns = run_ns(adc);
@@ -197,7 +197,7 @@ static void end_regular_group(struct device *device)
     if (device->words[CR1] & JAUTO) {
         adc->injected_at = 0;
         adc->injected_left = injected_length(device);
-        adc->is_automatic = 1;
+        adc->is_automatic = true;
         begin(device, INJECTED, switching_cycles(adc));
     } else if (mode & SLOW) { /* each ADC anew 28 cycles after its start */
         const uint32_t halves = halves_of(device, adc->channel);
@@ -248,9 +248,9 @@ static void end_injected(struct device *device, uint32_t code)
         begin(device, INJECTED, 0);
         return;
     }
-    adc->is_automatic = 0;
+    adc->is_automatic = false;
     if (adc->regular_waits) {
-        adc->regular_waits = 0;
+        adc->regular_waits = false;
         begin(device, REGULAR, was_automatic ? switching_cycles(adc) : 0);
     } else if (was_automatic && device->words[CR2] & CONT && !(device->words[CR1] & DISCEN)) {
         adc->regular_left = regular_length(device);
@@ -307,7 +307,7 @@ static void skip_rounds(struct device *device, uint64_t until)
     const uint64_t behind = (uint64_t)((__uint128_t)(until - adc->end_ns) * adc->hz / NS_PER_S);
     if (behind > 2 * round) {
         adc->cycles += (behind / round - 1) * round;
-        adc->has_sample = 0;
+        adc->has_sample = false;
         const uint64_t end = adc->cycles;
         adc->end_ns = run_ns(adc);
         adc->cycles -= CONVERTING_HALVES * (uint64_t)adc->divider / 2;
@@ -369,7 +369,7 @@ static void start_regular(struct device *device, uint64_t ns, uint32_t delay)
     adc->regular_at = is_in_parts && adc->regular_at < length ? adc->regular_at : 0;
     adc->regular_left = is_in_parts && at_once < length - adc->regular_at ? at_once : length - adc->regular_at;
     if (adc->state == INJECTED) {
-        adc->regular_waits = 1;
+        adc->regular_waits = true;
         device->words[SR] |= STRT;
     } else {
         begin_at(device, REGULAR, ns, delay);
@@ -599,14 +599,14 @@ static void take_sample(struct device *device, uint64_t now)
     settle(device, now);
     if (adc->state != IDLE && !adc->is_stopped && !adc->has_sample && adc->sample_ns <= now) {
         adc->sample = convert(device, adc->channel, adc->sample_ns);
-        adc->has_sample = 1;
+        adc->has_sample = true;
     }
 }
 
 /* Goes on from where the clock stood still. */
 static void resume(struct adc *adc, uint64_t span)
 {
-    adc->is_stopped = 0;
+    adc->is_stopped = false;
     adc->base_ns += span;
     adc->ready_ns += span;
     adc->sample_ns += span;
@@ -637,7 +637,7 @@ static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint
         take_sample(device, now);
     } else if (what == STOPPED) {
         take_sample(device, now);
-        adc->is_stopped = 1;
+        adc->is_stopped = true;
     } else if (what == RESUMED) {
         resume(adc, (uint64_t)other << 32 | one);
     }

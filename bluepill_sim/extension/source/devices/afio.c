@@ -64,7 +64,7 @@ static void write(struct device *device, uint32_t index, uint32_t written, uint3
         }
         place(device, true);
     }
-    ask(device, ROUTED, 0);
+    ask_about(device, ROUTED);
 }
 
 static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint32_t other)
@@ -74,7 +74,7 @@ static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint
     if (what == RESET) {
         ((struct afio *)device->state)->swj_cfg = 0;
         place(device, false);
-        ask(device, ROUTED, 0);
+        ask_about(device, ROUTED);
     }
     return 0;
 }

@@ -74,7 +74,7 @@ static void next_phase(struct device *device)
 {
     struct can_bits *bits = device->state;
     if (!is_wired(device->fabric, bits)) {
-        ask(device, CHANGED, 0);
+        ask_about(device, CHANGED);
         return;
     }
     if (bits->phase == TO_START) {

@@ -47,7 +47,7 @@ static uint64_t cycles_to(const struct dma *dma, uint32_t address)
 
 static uint64_t end_ns(const struct dma *dma)
 {
-    return dma->base_ns + dma->cycles / dma->hz * NS_PER_S + dma->cycles % dma->hz * NS_PER_S / dma->hz;
+    return dma->base_ns + (uint64_t)((__uint128_t)dma->cycles * NS_PER_S / dma->hz);
 }
 
 /* Chooses the channel of the next transfer, and returns when this ends; NO_TIME: none asks. */

@@ -13,7 +13,7 @@ static void set_access(struct device *device, uint32_t wait_states, bool has_pre
     if (clocks->flash_wait_states != wait_states || clocks->flash_prefetch != has_prefetch) {
         clocks->flash_wait_states = wait_states;
         clocks->flash_prefetch = has_prefetch;
-        ask(device, ACCESS, 0);
+        ask_about(device, ACCESS);
     }
 }
 

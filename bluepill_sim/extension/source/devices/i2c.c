@@ -195,7 +195,7 @@ static void rest(struct device *device, enum phase phase)
     show_rest(device, phase);
     i2c->phase = phase;
     i2c->due_ns = NO_TIME;
-    i2c->is_late = 0;
+    i2c->is_late = false;
 }
 
 static void run_from(struct device *device, uint64_t ns)
@@ -301,7 +301,7 @@ static void begin_start(struct device *device, uint64_t ns)
     struct i2c *i2c = device->state;
     if (i2c->phase == FREE && (device->words[CR1] & (PE | START)) == (PE | START) && !(device->words[SR2] & BUSY)) {
         if (!carries(device, SCL) || !carries(device, SDA)) {
-            ask(device, NO_PINS, 0);
+            ask_about(device, NO_PINS);
         }
         run_from(device, ns);
         begin(device, STARTING, CONDITION);
@@ -338,7 +338,7 @@ static void go_on(struct device *device, uint64_t ns)
     } else if (i2c->received) {
         rest(device, HOLD);
     } else {
-        i2c->incoming = i2c->has_parts && carries(device, SDA) ? ask(device, READ, 0) & 0xFF : 0xFF;
+        i2c->incoming = i2c->has_parts && carries(device, SDA) ? ask_about(device, READ) & 0xFF : 0xFF;
         begin(device, RECEIVING, BYTE);
     }
 }
@@ -369,7 +369,7 @@ static void lose_arbitration(struct device *device, uint64_t ns)
     } else {
         rest(device, FREE);
     }
-    i2c->is_lost = 0;
+    i2c->is_lost = false;
 }
 
 /* The eight bits of an address or a byte have gone out: who is meant acknowledges them, or another master has won. */
@@ -421,7 +421,7 @@ static void end_stop(struct device *device, uint64_t ns)
     uint32_t *words = device->words;
     tell(device, ns, TELL_STOP, 0);
     if (i2c->has_parts) {
-        ask(device, END, 0);
+        ask_about(device, END);
     }
     words[CR1] &= ~(uint32_t)(STOP | CR1_PEC);
     words[SR1] &= ~(uint32_t)(SB | ADD10 | TXE | (words[SR2] & TRA ? BTF : 0));
@@ -430,7 +430,7 @@ static void end_stop(struct device *device, uint64_t ns)
     rest(device, FREE);
     begin_start(device, ns);
     if (i2c->phase == FREE && i2c->far_waits) {
-        i2c->far_waits = 0;
+        i2c->far_waits = false;
         device->kind->command(device, CALL, 0, 0);
     }
 }
@@ -469,7 +469,7 @@ static uint32_t called(struct device *device, bool is_read)
     device->words[SR1] |= ADDR;
     device->words[SR2] |= is_read ? TRA : 0;
     ask_for_byte(device);
-    i2c->is_own = 1;
+    i2c->is_own = true;
     i2c->next_ack = device->words[CR1] & ACK;
     return HELD;
 }
@@ -484,7 +484,7 @@ static uint32_t end_far_start(struct device *device, uint32_t byte)
     if (!(i2c->is_own || i2c->header)) {
         set_pec(device, 0);
     }
-    i2c->is_own = i2c->tdr = i2c->was_refused = 0;
+    i2c->is_own = i2c->tdr = i2c->was_refused = false;
     add_to_pec(device, byte);
     if (which) {
         words[SR2] |= which & (GENCALL | DUALF);
@@ -500,7 +500,7 @@ static uint32_t end_far_write(struct device *device, uint32_t byte)
 {
     struct i2c *i2c = device->state;
     if (i2c->is_second) { /* of a 10-bit address */
-        i2c->is_second = 0;
+        i2c->is_second = false;
         add_to_pec(device, byte);
         i2c->header = byte == (device->words[OAR1] & 0xFF);
         return i2c->header ? called(device, false) : 0;
@@ -515,7 +515,7 @@ static uint32_t end_far_read(struct device *device, uint32_t acknowledges)
     add_to_pec(device, byte);
     if (!acknowledges && i2c->is_own) {
         device->words[SR1] = (device->words[SR1] & ~(uint32_t)TXE) | AF;
-        i2c->was_refused = 1;
+        i2c->was_refused = true;
     }
     return byte;
 }
@@ -554,7 +554,7 @@ static void go_on_far(struct device *device, uint64_t ns)
     }
     if (sends) {
         words[SR1] |= load(device) ? 0 : OVR;
-        i2c->has_sent = 1;
+        i2c->has_sent = true;
     } else if (step == FAR_READ) {
         i2c->shift = 0xFF;
     }
@@ -787,7 +787,7 @@ static void time_out(struct device *device)
     device->words[SR2] &= ~(uint32_t)(MSL | TRA);
     i2c->tdr = i2c->far = 0;
     if (i2c->phase != FREE && i2c->has_parts) {
-        ask(device, END, 0);
+        ask_about(device, END);
     }
     rest(device, FREE);
 }
@@ -805,7 +805,7 @@ static void event(struct device *device, uint64_t until)
         } else if ((i2c->phase == ADDRESSING || i2c->phase == SENDING) && !i2c->answer) {
             ask_parts(device);
         } else if (low_lines(device) & 1 << SCL) { /* somebody holds the clock: it ends when that lets go */
-            i2c->is_late = 1;
+            i2c->is_late = true;
             i2c->due_ns = NO_TIME;
         } else {
             const uint64_t ns = i2c->due_ns;
@@ -836,7 +836,7 @@ static void pins(struct device *device, uint32_t port, uint32_t changed)
             begin_start(device, ns);
         }
     } else if (i2c->is_late && !(low & 1 << SCL)) {
-        i2c->is_late = 0;
+        i2c->is_late = false;
         i2c->due_ns = ns;
         i2c->base_ns = ns;
         i2c->ticks = 0;
@@ -896,7 +896,7 @@ static void write_data(struct device *device, uint32_t byte)
     uint32_t *words = device->words;
     if (words[SR1] & (SB | ADD10)) {
         if (!(words[SEEN] & words[SR1] & (SB | ADD10))) {
-            ask(device, SEQUENCE, 0);
+            ask_about(device, SEQUENCE);
             return;
         }
         i2c->is_second = words[SR1] & ADD10;
@@ -923,11 +923,11 @@ static void clear(struct device *device, bool keeps_busy)
         tell(device, now_ns(device->fabric), TELL_CUT, 0);
     }
     if (i2c->phase != FREE && i2c->has_parts) {
-        ask(device, END, 0);
+        ask_about(device, END);
     }
     i2c->is_stopped = 0;
     i2c->answer = 0;
-    i2c->shift = i2c->tdr = i2c->rdr = i2c->received = i2c->far = i2c->is_own = i2c->header = i2c->is_lost = 0;
+    i2c->shift = i2c->tdr = i2c->rdr = i2c->received = i2c->far = i2c->is_own = i2c->header = i2c->is_lost = false;
     i2c->next_ack = i2c->was_refused = i2c->has_sent = i2c->is_second = i2c->is_pec = i2c->lines = 0;
     i2c->timeout_ns = NO_TIME;
     rest(device, FREE);
@@ -1019,10 +1019,10 @@ static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint
         break;
     case CALL:
         if (i2c->phase != FREE || device->words[SR2] & BUSY || i2c->is_stopped & CLOCK_STOPPED) {
-            i2c->far_waits = 1;
+            i2c->far_waits = true;
             break;
         }
-        i2c->far = ask(device, NEXT_STEP, 0);
+        i2c->far = ask_about(device, NEXT_STEP);
         i2c->phase = FAR_HOLD;
         i2c->rate_hz = i2c->far_hz;
         go_on_far(device, now);
@@ -1041,7 +1041,7 @@ static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint
     case GO_ON_TIMEOUT:
         resume(device, (uint64_t)other << 32 | one);
         if (i2c->phase == FREE && i2c->far_waits && !(device->words[SR2] & BUSY)) {
-            i2c->far_waits = 0;
+            i2c->far_waits = false;
             command(device, CALL, 0, 0);
         }
         break;

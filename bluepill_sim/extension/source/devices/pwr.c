@@ -11,7 +11,7 @@ static void write(struct device *device, uint32_t index, uint32_t written, uint3
     uint32_t *words = device->words;
     if (index == CSR) {
         if ((words[CSR] ^ previous) & EWUP) {
-            ask(device, WAKE_PIN, 0);
+            ask_about(device, WAKE_PIN);
         }
         return;
     }
@@ -20,7 +20,7 @@ static void write(struct device *device, uint32_t index, uint32_t written, uint3
         ask(device, BACKUP, (words[CR] & DBP) != 0);
     }
     if ((words[CR] | previous) & PVDE) {
-        ask(device, SUPPLY, 0);
+        ask_about(device, SUPPLY);
     }
 }
 

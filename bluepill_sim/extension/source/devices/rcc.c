@@ -120,10 +120,10 @@ static void settle(struct device *device)
         words[CFGR] = (words[CFGR] & ~(uint32_t)SWS) | wanted << SWS_AT;
     }
     if (frequencies_changed(device)) {
-        ask(device, CLOCKS, 0);
+        ask_about(device, CLOCKS);
     }
     if (words[CFGR] & MCO || rcc->shows_clock) {
-        ask(device, SHOWS, 0);
+        ask_about(device, SHOWS);
     }
     schedule_next(device);
 }
@@ -154,7 +154,7 @@ static void write_cr(struct device *device, uint32_t written, uint32_t previous)
     const uint32_t stopped = in_use(words) & previous & ~written;
     if (stopped) {
         words[CR] |= stopped;
-        ask(device, IN_USE, 0);
+        ask_about(device, IN_USE);
     }
     if (previous & HSEON && (written ^ previous) & HSEBYP) {
         words[CR] ^= HSEBYP;
@@ -168,11 +168,11 @@ static void write_cfgr(struct device *device, uint32_t written, uint32_t previou
     const uint32_t changed = (written ^ previous) & PLL_SETTINGS;
     if (changed && words[CR] & PLLON) {
         words[CFGR] ^= changed;
-        ask(device, PLL_IS_ON, 0);
+        ask_about(device, PLL_IS_ON);
     }
     if ((written & SW) == SW) {
         words[CFGR] = (words[CFGR] & ~(uint32_t)SW) | (previous & SW);
-        ask(device, NO_SOURCE, 0);
+        ask_about(device, NO_SOURCE);
     }
     settle(device);
 }
@@ -181,7 +181,7 @@ static void write_cir(struct device *device, uint32_t written)
 {
     device->words[CIR] &= ~(written >> 16 & (FLAGS | CSSF));
     if (written & CSSC) {
-        ask(device, CSS_CLEARED, 0);
+        ask_about(device, CSS_CLEARED);
     }
     update_irq(device);
 }
@@ -214,7 +214,7 @@ static void write(struct device *device, uint32_t index, uint32_t written, uint3
         break;
     default:
         if (((const struct rcc *)device->state)->watches_gates) {
-            ask(device, GATES, 0);
+            ask_about(device, GATES);
         }
     }
 }

@@ -132,7 +132,7 @@ static void check_mode_fault(struct device *device)
         device->words[SR] = (device->words[SR] | MODF) & ~(uint32_t)BSY;
         spi->shift = spi->half = 0;
         schedule(device, NO_TIME);
-        ask(device, MODE_FAULT, 0);
+        ask_about(device, MODE_FAULT);
     }
 }
 
@@ -172,11 +172,11 @@ static uint32_t exchange(struct device *device, uint32_t sent)
     const struct port *port = &device->fabric->ports[spi->pins[data] / PINS];
     const bool is_readable = port->bonded & ~port->analog & ~port->held & 1u << spi->pins[data] % PINS;
     if (!carries(device, SCK)) {
-        ask(device, NO_SCK, 0);
+        ask_about(device, NO_SCK);
         return is_high(device, data) ? mask : 0;
     }
     if (!only_receives(device) && !carries(device, MOSI)) {
-        ask(device, NO_MOSI, 0);
+        ask_about(device, NO_MOSI);
         sent = is_high(device, MOSI) ? mask : 0;
     }
     uint32_t got = !only_sends(device) && is_high(device, data) ? mask : 0; /* its own bits may be on the wire */
@@ -187,7 +187,7 @@ static uint32_t exchange(struct device *device, uint32_t sent)
         got = spi->ahead_at < spi->ahead_count && holds ? spi->ahead[spi->ahead_at++] : ask(device, EXCHANGE, sent) & mask;
     }
     if (!is_readable && !only_sends(device)) {
-        ask(device, NO_MISO, 0);
+        ask_about(device, NO_MISO);
         return 0;
     }
     return got;
@@ -486,7 +486,7 @@ static void write(struct device *device, uint32_t index, uint32_t written, uint3
     struct spi *spi = device->state;
     if (index == DR) {
         if (spi->tdr) {
-            ask(device, WORD_LOST, 0);
+            ask_about(device, WORD_LOST);
         }
         spi->tdr = HELD | (written & mask_of(device));
         device->words[SR] &= ~(uint32_t)TXE;
@@ -562,11 +562,11 @@ static uint32_t command(struct device *device, uint32_t what, uint32_t one, uint
         break;
     case STOPPED:
         event(device, now);
-        spi->is_stopped = 1;
+        spi->is_stopped = true;
         schedule(device, NO_TIME);
         break;
     case RESUMED:
-        spi->is_stopped = 0;
+        spi->is_stopped = false;
         spi->base_ns += (uint64_t)other << 32 | one;
         spi->word_ns += (uint64_t)other << 32 | one;
         if (spi->shift) {

@@ -126,11 +126,11 @@ void refresh(struct device *device)
         tim->late_at = tim->at + 1;
         return;
     }
-    tim->is_busy = 1;
+    tim->is_busy = true;
     show_outputs(device);
     update_irqs(device);
     give_pulses(device);
-    tim->is_busy = 0;
+    tim->is_busy = false;
     const uint64_t stop = tim->is_stopped ? NO_TIME : next_stop(device);
     schedule(device, stop == NO_TIME ? NO_TIME : ns_of_tick(&tim->ticks, stop));
 }
@@ -474,7 +474,7 @@ static void stop_clock(struct device *device)
 {
     struct tim *tim = tim_of(device);
     synchronize(device, tick_now(device));
-    tim->is_stopped = 1;
+    tim->is_stopped = true;
     tim->ticks.ns = NO_TIME;
     tim->ticks.tick = tim->at;
 }
@@ -488,7 +488,7 @@ static void resume_clock(struct device *device)
         return;
     }
     const struct ticks grid = {.ns = fabric->time.ns, .hz = tim->ticks.hz};
-    tim->is_stopped = 0;
+    tim->is_stopped = false;
     tim->ticks.ns = grid.ns;
     tim->ticks.tick = tim->at - tick_at(&grid, now_ns(device->fabric));
     take_what_waits(device);

@@ -207,7 +207,7 @@ void look_at_trigger(struct device *device)
     if (hears != tim->hears) {
         const uint8_t was_busy = tim->is_busy;
         tim->hears = hears;
-        tim->is_busy = 1; /* a level that is there already is no edge */
+        tim->is_busy = true; /* a level that is there already is no edge */
         hearing_changed(device);
         tim->is_busy = was_busy;
     }

@@ -211,13 +211,13 @@ static void emit(struct device *device, uint32_t word, uint64_t ns)
 {
     struct usart *usart = device->state;
     if (!carries(device)) {
-        ask(device, TX_PIN, 0);
+        ask_about(device, TX_PIN);
         return;
     }
     if (usart->judged_hz != usart->clock_hz || usart->judged_brr != device->words[BRR]) {
         usart->judged_hz = usart->clock_hz;
         usart->judged_brr = device->words[BRR];
-        ask(device, JUDGE_SPEED, 0);
+        ask_about(device, JUDGE_SPEED);
     }
     const uint32_t format = device->words[CR1] | (device->words[CR2] >> 12 & 3) << 16;
     const struct sent row = {ns, word, usart->clock_hz, device->words[BRR], format};
@@ -297,11 +297,11 @@ static void end_reception(struct device *device, uint64_t ns)
     const uint32_t arrived = usart->rx[usart->rx_first];
     usart->rx_first = (usart->rx_first + 1) % RECEIVED;
     if (!--usart->rx_count && usart->rx_more) {
-        ask(device, GIVE_MORE, 0);
+        ask_about(device, GIVE_MORE);
     }
     usart->rx_half_bits += frame_half_bits(device);
     if (!can_receive(device)) {
-        ask(device, RX_OFF, 0);
+        ask_about(device, RX_OFF);
         return;
     }
     arrive(device, arrived);
@@ -345,15 +345,15 @@ static void write_data(struct device *device, uint32_t word)
         words[SR] &= ~(uint32_t)TC;
     }
     if (!is_transmitting(device)) {
-        ask(device, TX_OFF, 0);
+        ask_about(device, TX_OFF);
     } else if (!words[BRR]) {
-        ask(device, NO_RATE, 0);
+        ask_about(device, NO_RATE);
     } else if (!words[SHIFT] && may_send(device)) {
         load(device, HELD | word, now_ns(device->fabric), 0);
         find_deadlines(device);
     } else {
         if (words[TDR]) {
-            ask(device, CHARACTER_LOST, 0);
+            ask_about(device, CHARACTER_LOST);
         }
         words[TDR] = HELD | word;
         words[SR] &= ~(uint32_t)TXE;
@@ -407,7 +407,7 @@ static void write_control(struct device *device)
     struct usart *usart = device->state;
     uint32_t *words = device->words;
     const bool is_on = is_transmitting(device), has_rate = words[BRR] > 0;
-    ask(device, CHECK_MODES, 0);
+    ask_about(device, CHECK_MODES);
     if (is_on && !usart->was_enabled) {
         connect(device, true);
         if (!words[SHIFT] && has_rate) {
@@ -416,7 +416,7 @@ static void write_control(struct device *device)
     } else if (!(words[CR1] & TE) && words[SHIFT]) {
         /* UE lets the present character end; TE cuts it off (RM0008 27.3.2). */
         if ((words[SHIFT] | words[TDR]) & HELD) { /* an idle character or a break says nothing */
-            ask(device, CUT_OFF, 0);
+            ask_about(device, CUT_OFF);
         }
         words[SHIFT] = words[TDR] = usart->bits = 0;
         words[SR] |= TXE | TC;

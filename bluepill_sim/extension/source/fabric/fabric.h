@@ -393,6 +393,8 @@ static inline uint32_t ask(struct device *device, uint32_t what, uint32_t value)
     leave_ahead(device->fabric);
     return device->fabric->calls.ask(device->slot, what, value);
 }
+/* The same of what has no value. */
+static inline uint32_t ask_about(struct device *device, uint32_t what) { return ask(device, what, 0); }
 
 /* devices.c */
 /* Makes the register of a counter known; `ramp` and `ticks` stay where they are, and are right up to the next event. */

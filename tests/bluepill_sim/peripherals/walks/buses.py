@@ -81,7 +81,7 @@ def _usart(number: int) -> RegisterWalk:  # noqa: C901 - a function a move
 
     def hear(w: RegisterWalker) -> None:
         data = [w.pick((0, 5, 0x55, 0x85, 0xFF, 0x105, w.number(512))) for _ in range(1 + w.number(3))]
-        data *= w.pick((1, 1, 1, 1, 1, 60))
+        data *= w.pick((*(1,) * 9, 20, 150))
         damage = ReceiveError(w.some(*ReceiveError)) if not w.number(3) else ReceiveError(0)
         w.note(f"hears {data} {damage.value}")
         w.part(name).receive(data, damage)
@@ -287,11 +287,25 @@ def _i2c(number: int) -> RegisterWalk:  # noqa: C901, PLR0915 - a function a mov
         """It is called, and no program does anything; as SMBus's host it may be alerted."""
         w.turn(f"{name}.CR1", on=_PE | _ACK | w.pick((_NOSTRETCH, 10, 0)))
         w.drive(smba, w.pick((True, False)))
-        if w.number(2):
+        if not w.number(3):
+            _called_twice(w)
+        elif w.number(2):
             w.part(name).call(0x30, bytes(w.number(256) for _ in range(w.number(5))), w.number(4))
         w.run(w.pick((300_000, 600_000)))
         w.drive(smba, False)
         w.turn(f"{name}.CR1", on=_STOP * w.number(2))
+
+    def _called_twice(w: RegisterWalker) -> None:
+        """Its second address, or everybody's, is called, written and read; between, it may be its own no longer."""
+        w.write(f"{name}.OAR2", 0x63)
+        w.turn(f"{name}.CR1", on=_ENGC)
+        w.part(name).call(w.pick((0x31, 0x31, 0)), bytes((1, 2)), 2)
+        for _ in range(6):
+            w.run(60_000)
+            drive(w)
+            if not w.number(3):
+                w.write(f"{name}.OAR2", w.pick((0, 0x63)))
+                w.turn(f"{name}.CR1", off=_ENGC)
 
     def disturbed(w: RegisterWalker) -> None:
         w.note("is disturbed")
@@ -355,9 +369,9 @@ def _narrow_filters(w: RegisterWalker) -> int:
 
 
 def _frame(w: RegisterWalker) -> CanFrame:
-    identifier = w.pick((0x123, 0x124, 0x7FF, 0))
+    identifier = w.pick((0x123, 0x123, 0x123, 0x124, 0x7FF, 0))
     if w.number(3) == 0:
-        low = w.pick((0x155, 0x1_0155, 0x2_8000, 0x3_FFFF, 0))
+        low = w.pick((0x155, 0x1_0155, 0x2_8000, 0x2_8000, 0x8000, 0))
         return CanFrame(identifier=identifier << 18 | low, is_extended=True, data=bytes(range(w.number(9))))
     if w.number(5) == 0:
         return CanFrame(identifier=identifier, is_remote=True, remote_bytes=w.number(9))
@@ -461,7 +475,7 @@ def _can_repeated(w: RegisterWalker) -> None:
     _can_send(w)
     w.run(w.pick((4_000_000, 6_000_000, 6_100_123)))
     w.run(w.pick((125, 100_000, 333_333)))
-    w.pick((_can_flags, _can_send, _can_unwired, _can_mode, _can_wire, _can_take))(w)
+    w.pick((_can_flags, _can_send, _can_unwired, _can_mode, _can_wire, _can_take, RegisterWalker.reset))(w)
 
 
 _CAN = RegisterWalk(
@@ -482,6 +496,8 @@ _CAN_ALONE = RegisterWalk(
 # USB.
 
 _USB_ADDRESS = 5
+#: Control, bulk, bulk with two buffers, isochronous, interrupt; and what stalls or answers NAK.
+_ENDPOINTS = (0x3230, 0x3030, 0x3630, 0x3130, 0x3430, 0x3630, 0x1010, 0x2620)
 
 
 def _usb_begin(w: RegisterWalker) -> None:
@@ -500,7 +516,8 @@ def _usb_begin(w: RegisterWalker) -> None:
         sizes = w.pick((8 * n, 8 * n, 64, 0x1FF, 0x201, 0x3FF)), w.pick((0x8400, 0x1000, 0x7C00, 0xFC00, 0x8000, 0x400))
         for word, value in enumerate((64 + 128 * n, sizes[0], 128 + 128 * n, sizes[1])):
             w.part("USB").write(0x400 + at + 16 * n + 4 * word, 4, value)
-        w.write(f"USB.EP{n}R", w.pick((0x3230, 0x3030, 0x3130, 0x3430, 0x3630, 0x1010, 0x2020)) | w.some(0x4040) | n)
+        mode = _ENDPOINTS[(w.episode + 3 * n) % len(_ENDPOINTS)]
+        w.write(f"USB.EP{n}R", mode | w.some(0x40, 0x4000) | n)
     _usb_bus(w)
 
 

@@ -155,6 +155,19 @@ def _flash_all(w: RegisterWalker) -> None:
     w.note(f"{zlib.crc32(flash.memory.read(0, flash.memory.size)):08x} {flash.memory.options.hex()}")
 
 
+def _flash_unprotect(w: RegisterWalker) -> None:
+    """Take the protection against reading back, which erases all."""
+    flash = w.part("FLASH")
+    _flash_open(w)
+    w.write("FLASH.CR", 0x260)
+    w.run(20_000_000)
+    _flash_open(w)
+    w.write("FLASH.CR", 0x210)
+    w.note(f"{flash.program_option(w.pick((0, 0, 0, 2)), 2, w.pick((0xA5, 0xA5, 0xA5, 0xA4)))}")
+    w.run(w.pick((52_500, 20_052_499, 40_052_499, 40_052_500)))
+    w.note(f"{zlib.crc32(flash.memory.read(0, flash.memory.size)):08x} {flash.memory.options.hex()}")
+
+
 def _flash_protect(w: RegisterWalker) -> None:
     """Erase the option bytes, or write a group's, and have a reset load them."""
     flash = w.part("FLASH")
@@ -176,7 +189,7 @@ def _flash_protect(w: RegisterWalker) -> None:
 _FLASH = RegisterWalk(
     name="FLASH", parts=("FLASH",), begin=_flash_begin,
     moves=(*(_flash_move, _flash_program) * 3, _flash_move, _flash_protect, _flash_halfwords, _flash_halfwords,
-           _flash_all),
+           _flash_all, _flash_unprotect),
     spans_ns=(125, 20_000, 52_500, 70_000, 20_000_000, 40_000_000), at_random=12, episodes=26,
 )  # fmt: skip
 
@@ -232,6 +245,26 @@ def _rtc_cut(w: RegisterWalker) -> None:
     w.turn("RTC.CRL", off=0x10)
 
 
+def _rtc_alarm(w: RegisterWalker) -> None:
+    """Seconds of a few periods of its clock up to an alarm, shown at PC13 or not."""
+    w.turn("RCC.APB1ENR", on=0x1800_0000)
+    w.write("PWR.CR", 0x100)
+    w.write("RCC.CSR", 1)
+    if w.look("RCC.BDCR") & 0x8300 != 0x8200:
+        w.write("RCC.BDCR", 1 << 16)
+        w.write("RCC.BDCR", 0x8200)
+        w.run(100_000)
+    w.write("BKP.RTCCR", w.pick((0, 0x100, 0x300, 0x80)))
+    w.turn("RTC.CRL", on=0x10)
+    high, low = w.pick((0, 0, 0xFFFF)), w.pick((0, 7, 0xFFFE))
+    for register, word in (("CNTH", high), ("CNTL", low), ("ALRH", high), ("ALRL", low + 1), ("PRLL", w.number(4))):
+        w.write(f"RTC.{register}", word)
+    w.turn("RTC.CRL", off=0x10)
+    for span_ns in (200_000, 24_999, 75_000, 100_000):
+        w.run(span_ns)
+    w.read("RTC.CRL")
+
+
 def _bkp_move(w: RegisterWalker) -> None:
     register, words = w.pick((
         ("DR1", (0x1234,)), ("DR10", (0xABCD, 0)), ("RTCCR", (0, 0x80, 0x100, 0x300, 0x85)), ("CR", (0, 1, 2, 3)),
@@ -260,12 +293,13 @@ def _pwr_move(w: RegisterWalker) -> None:
 
 def _backup_domain(name: str, *parts: str) -> RegisterWalk:
     moves = {
-        "RTC": (_rtc_move, _rtc_move, _rtc_read, _rtc_move, _rtc_read, _rtc_cut),
+        "RTC": (_rtc_move, _rtc_move, _rtc_read, _rtc_move, _rtc_alarm, _rtc_cut),
         "BKP": (_bkp_move,),
         "PWR": (_pwr_move,),
     }[name]
     return RegisterWalk(
-        name=name, parts=(name, *parts), begin=_backup_begin, moves=(*moves, *moves, _rtc_move, _bkp_move, _lsi),
+        name=name, parts=(name, *parts), begin=_backup_begin,
+        moves=(*moves, *moves, _rtc_move, _bkp_move, _rtc_alarm, _lsi),
         spans_ns=(125, 31_000, 62_000, 100_000, 1_000_000, 30_000_000), beside=("RCC", "EXTI"),
     )  # fmt: skip
 

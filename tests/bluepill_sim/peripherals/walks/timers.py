@@ -40,8 +40,8 @@ def _tim(number: int) -> RegisterWalk:  # noqa: C901, PLR0915 - a function a mov
             w.turn("RCC.CR", on=1 << 16)
             w.run(2_000_000)
             w.turn("RCC.CR", on=1 << 19)
-        w.write(f"{name}.CCER", w.pick((0x1111, 0x3333, 0x0555, 0x0DDD, 0x0F7B, 0x1010)))
-        w.write(f"{name}.SMCR", w.pick(_SLAVES))
+        w.write(f"{name}.CCER", w.pick((0x1111, 0x3333, 0x0555, 0x0DDD, 0x0F7B, 0x1010, 0x1331)))
+        w.write(f"{name}.SMCR", w.turn_of(_SLAVES))
         w.write(f"{name}.DIER", w.pick((0, 0, 0x1F, 0x5F, 0xFFFF, 0x7F00)))
         w.write(f"{name}.CR2", w.pick((0, 0x10, 0x20, 0x30, 0x40, 0x50, 0x70, 0x80, 0xFF, 5)))
         if number == 1:
@@ -109,7 +109,16 @@ def _tim(number: int) -> RegisterWalk:  # noqa: C901, PLR0915 - a function a mov
         ))  # fmt: skip
         w.write(f"{name}.{register}", w.pick(words))
 
-    moves = (pin, pin, glitch, glitch, compare, clear, clear, generate, shape, shape, duty)
+    def burst(w: RegisterWalker) -> None:
+        """Write registers through DMAR, with a write of another in between."""
+        w.write(f"{name}.DCR", w.pick((0x20D, 0x307, 0x10B)))
+        for _ in range(4):
+            w.write(f"{name}.DMAR", w.number(60))
+            if not w.number(3):
+                other_register = w.pick(("BDTR", "DIER", "SR") if number == 1 else ("DIER", "SR", "CR2"))
+                w.write(f"{name}.{other_register}", w.look(f"{name}.{other_register}"))
+
+    moves = (pin, pin, glitch, glitch, compare, clear, clear, generate, shape, shape, duty, burst)
     return RegisterWalk(
         name=name, parts=(name, "DMA1"), begin=begin, remaps=_TIM_REMAPS[number],
         moves=(*moves, crystal) if number == 1 else moves,

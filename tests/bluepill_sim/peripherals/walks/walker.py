@@ -102,7 +102,7 @@ class CountingSpiDevice(Stateful):
 
     STATE = ("sum", "is_exact")
     spi_modes = frozenset({0, 3})
-    max_hz = 36_000_000
+    max_hz = 12_000_000
 
     def __init__(self) -> None:
         self.sum, self.is_exact = 0, False
@@ -165,12 +165,13 @@ def _answer(word: int, at_ns: int) -> int:
 
 
 class CountingUsbHost(Stateful):
-    """What stands at the other end of a USB cable, counts what it is told, and acts each 0.7 ms of the first 7."""
+    """The other end of a USB cable: counts what it is told, and acts 0.7 ms behind each fourth change."""
 
     STATE = ("sum", "next_ns")
 
     def __init__(self) -> None:
-        self.sum, self.next_ns = 0, None
+        self.sum = 0
+        self.next_ns: int | None = None
 
     def advance_to(self, now_ns: int) -> None:
         """Count."""
@@ -276,12 +277,13 @@ def boards(*, is_alone: bool) -> tuple[WalkedBoard, WalkedBoard]:
 
 
 @cache
-def _looked_at(kind: Any, name: str) -> tuple[tuple[str, int, bool], ...]:
-    """Return the name of each register of a part, its place, and whether it has to be asked."""
-    return tuple(
+def _looked_at(kind: Any, name: str) -> tuple[tuple[tuple[str, int, bool], ...], tuple[tuple[str, int, bool], ...]]:
+    """Return the name of each register of a part, its place, and whether it has to be asked; and those that have to."""
+    found = tuple(
         (f"{name}.{one.name}", one.offset // 4, one.on_read is not None)
         for one in kind.REGISTERS if not one.name.startswith(_MEMORY)
     )  # fmt: skip
+    return found, tuple(one for one in found if one[2])
 
 
 class RegisterWalker:
@@ -297,6 +299,7 @@ class RegisterWalker:
         self.lines: list[str] = []
         self._done: list[str] = []
         self._seen: dict[str, object] = {}
+        self._raw: dict[str, bytes] = {}
         self._ports, self._wires, self._drives = b"", "", ""
 
     # What decides, from the random numbers: `random` alone is the same on every version of Python.
@@ -543,7 +546,7 @@ class RegisterWalker:
             f"{name} {value:#x}" if isinstance(value, int) else f"{name} {value}"
             for name, value in now.items() if self._seen.get(name) != value
         ]  # fmt: skip
-        self._seen = now
+        self._seen |= now
         heard = self._now.heard
         if len(heard) > _SHOWN:
             heard[_SHOWN:] = [f"and {len(heard) - _SHOWN} more: {zlib.crc32(' '.join(heard).encode()):08x}"]
@@ -551,14 +554,16 @@ class RegisterWalker:
         heard.clear()
 
     def _all(self) -> Iterator[tuple[str, object]]:
-        """Go through all that can be seen now."""
+        """Go through all that can be seen now; of parts that hold what they held, what only they can say."""
         board = self.board
         for name in (*self.walk.parts, *self.walk.beside):
             part: Any = board.chip.parts.by_name[name]
             words = part.words
-            for key, place, is_asked in _looked_at(type(part), name):
+            raw = words.tobytes()
+            is_same, self._raw[name] = raw == self._raw.get(name), raw
+            for key, place, is_asked in _looked_at(type(part), name)[is_same]:
                 yield key, part.look(4 * place) if is_asked else words[place]
-            if len(words) > _USUAL_WORDS:
+            if len(words) > _USUAL_WORDS and not is_same:
                 yield f"{name} memory", zlib.crc32(memoryview(words)[_USUAL_WORDS:])
             yield f"{name} acts", part.due_ns
         lines = board.chip.pins.fabric.lines
@@ -571,6 +576,7 @@ class RegisterWalker:
             self._drives = "".join(_LETTERS[pin.output] for pin in board.pins)
         yield "wires", self._wires
         yield "drives", self._drives
+        yield "routes", " ".join(f"{name} {route}" for name, route in board.chip.pins.remaps.items() if route)
         yield "memory", zlib.crc32(board.read_memory(BUFFER, BUFFER_BYTES) or b"")
         yield "warnings", " / ".join(board.warnings)
         yield "resets", " ".join(f"{cause.name} {count}" for cause, count in board.resets.items())
