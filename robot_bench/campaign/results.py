@@ -211,6 +211,8 @@ class Whole:
     #: Number of a point → until when its failure was avoidable.
     moments: dict[int, LastMoment] = field(default_factory=dict)
     was_interrupted: bool = False
+    #: What was reached of the source, of so many blocks and ways; both only grow.
+    _source: tuple[int, int, SourceReached | None] = (-1, -1, None)
 
     @property
     def counts(self) -> Mapping[PointFinding, int]:
@@ -238,7 +240,10 @@ class Whole:
     @property
     def source(self) -> SourceReached | None:
         """What of the program's source the cheap runs have reached; None where there is no one program."""
-        return source_reached(self.campaign.trial, self.progress.blocks, self.progress.ways)
+        blocks, ways = self.progress.blocks, self.progress.ways
+        if self._source[:2] != (len(blocks), len(ways)):  # asked for by the page, the summary and the terminal
+            self._source = len(blocks), len(ways), source_reached(self.campaign.trial, blocks, ways)
+        return self._source[2]
 
     @property
     def unreached(self) -> list[str]:

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from bluepill_sim.analysis.coverage import Coverage, FileCoverage
 from bluepill_sim.board import BluePill
 from p2os.errors import ScenarioError
+from robot_bench.bench.board import boot
 from robot_bench.campaign.reaching.reach import ToReach, ToReachTable
-from robot_bench.campaign.trial import Trial, bench_of, unpacked
+from robot_bench.campaign.trial import Trial, unpacked
 from simbase.errors import P2osError, nearest, shown
 from simbase.units import ranges_text
 
@@ -93,5 +94,7 @@ def _board(trial: Trial) -> BluePill | None:
     if len(trial.programs) != 1:
         return None
     with unpacked(trial.files) as folder:
-        chips = [one.chip for one in bench_of(trial.scenario(folder)).robots.values()]
-    return chips[0] if isinstance(chips[0], BluePill) else None
+        scenario = trial.scenario(folder)
+        robots = [robot.scenario for robot in scenario.robots if robot.scenario is not None]
+        chip = boot(robots[0] if robots else scenario)
+    return chip if isinstance(chip, BluePill) else None

@@ -156,6 +156,51 @@ class PrintsNumbers(Printed):
         return GoalOutcome(met=not self._failure, says=self._failure)
 
 
+class PrintsLinesTable(Record):
+    """What the lines look like that a program prints."""
+
+    matches: Annotated[tuple[str, ...], Key(kind="list", doc="regular expressions, one of which is a whole line")]
+    first: Annotated[str | None, Key(doc="one that the first line is")] = None
+
+    def __post_init__(self) -> None:
+        refuse_other_than_texts("matches", self.matches)
+        for one in [*self.matches, *([] if self.first is None else [self.first])]:
+            try:
+                re.compile(one)
+            except re.error as error:
+                raise UsageError(f"{one!r} is no regular expression: {error}") from error
+
+
+class PrintsLines(Printed):
+    """Each line that has come to its end is one that a program prints, and the first the one that it begins with."""
+
+    STATE = ("_has_begun", "_failure")
+
+    def __init__(self, table: PrintsLinesTable) -> None:
+        super().__init__()
+        self._is_known = re.compile("|".join(f"(?:{one})" for one in table.matches)).fullmatch
+        self._is_first = re.compile(".*" if table.first is None else table.first).fullmatch
+        self._has_begun = False
+        self._failure = ""
+
+    def feed(self, event: Event) -> GoalOutcome | None:
+        if not isinstance(event, Text) or (line := self.read(event)) is None or not event.data.endswith(b"\n"):
+            return None
+        wrong = "it prints no such line" if not self._is_known(line) else ""
+        if not self._has_begun and not self._is_first(line):
+            wrong = "it begins with another line"
+        self._has_begun = True
+        if self._failure or not wrong:
+            return None
+        self._failure = f"{line!r} at {seconds(event.t)}: {wrong}"
+        return self.finish(event.t)
+
+    def finish(self, end: Nanos) -> GoalOutcome:
+        if not self._has_begun:
+            return GoalOutcome(met=False, says=f"no line was printed to its end; {self.last}")
+        return GoalOutcome(met=not self._failure, says=self._failure)
+
+
 def _bounded(table: PrintsNumbersTable) -> str:
     bounds = given_in_words((" of at least ", table.least, ""), (" of at most ", table.most, ""))
     return "".join(bounds) + ("" if table.signal is None else f" that {table.signal} had")
@@ -181,5 +226,11 @@ KINDS: Mapping[str, GoalKind] = {
         PrintsNumbersTable, lambda table: f"prints {table.matches!r} with numbers{_bounded(table)}", PrintsNumbers,
         doc="each line that matches has a number within bounds, or one that the signal had in the time before; one "
         "line at least does", any_of=("least", "most", "signal"), holds_anywhere=True,
+    ),
+    "prints_lines": GoalKind(
+        PrintsLinesTable, lambda table: f"prints lines {' or '.join(map(repr, table.matches))} alone"
+        + ("" if table.first is None else f", {table.first!r} first"), PrintsLines,
+        doc="each line is one that matches, from its beginning to its end, and the first matches `first`; one line at "
+        "least is printed", holds_anywhere=True,
     ),
 }  # fmt: skip

@@ -173,7 +173,7 @@ HOLDS_SO_FAR: dict[str, dict[str, object]] = {
     "never": {"event": "contact"}, "latency": {"from": "usart1 sends left", "to": "usart1 sends sensor", "most_s": 2},
     "answers": {"signal": "mean", "most": 3, "within_s": 1}, "lasts": {"motion": "stand", "most_s": 9},
     "has_reason": {"motion": "turn", "needs": [["DD1"]], "within_s": 1},
-    "prints_numbers": {"matches": "left=(\\d)", "most": 0},
+    "prints_numbers": {"matches": "left=(\\d)", "most": 0}, "prints_lines": {"matches": ["left.*", "sensor.*"]},
     "pin_holds": {"pin": "PB7", "level": "high"}, "wave": {"pin": "motor1_comm2", "least_hz": 0.5},
 }  # fmt: skip
 #: Those that are decided once they are met: no later event can change it.

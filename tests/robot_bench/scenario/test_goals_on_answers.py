@@ -147,6 +147,25 @@ def test_goal_prints_numbers_within_bounds() -> None:
 
 
 @pytest.mark.parametrize(
+    ("pieces", "says"),
+    [
+        (["car: ready\n", "car: go 1\n"], ""),
+        (["car: rea", "dy\ncar: go 1\n", "car: g"], ""),  # the last one has not come to its end
+        (["car: ready\n", "go 1\n"], "'go 1' at 2.000 s: it prints no such line"),
+        (["car: ready\n", "car: go 1car: go 2\n"], "'car: go 1car: go 2' at 2.000 s: it prints no such line"),
+        (["car: go 1\n", "car: ready\n"], "'car: go 1' at 1.000 s: it begins with another line"),
+        (["car: ready\n", "car: stop\n", "car: go\n"], "'car: stop' at 2.000 s: it prints no such line"),
+        (["car: ready"], "no line was printed to its end; the last line is 'car: ready'"),
+    ],
+)
+def test_goal_prints_lines_that_are_known_alone(pieces: list[str], says: str) -> None:
+    texts = [Text(t=number * S, data=line.encode()) for number, piece in enumerate(pieces, 1)
+             for line in piece.splitlines(keepends=True)]  # fmt: skip
+    found = outcome("prints_lines", texts, matches=["car: ready", r"car: go \d"], first="car: ready")
+    assert (found.met, found.says) == (not says, says)
+
+
+@pytest.mark.parametrize(
     ("table", "refusal"),
     [
         ({"kind": "answers", "signal": "mean", "within_s": 1}, "needs least or most"),
@@ -157,6 +176,10 @@ def test_goal_prints_numbers_within_bounds() -> None:
         ({"kind": "lasts", "motion": "turn"}, "needs least_s or most_s"),
         ({"kind": "prints_numbers", "matches": "left", "most": 1}, "has not one group"),
         ({"kind": "prints_numbers", "matches": "(", "most": 1}, "matches"),
+        ({"kind": "prints_lines", "matches": []}, "matches is empty"),
+        ({"kind": "prints_lines", "matches": [1]}, "matches"),
+        ({"kind": "prints_lines", "matches": ["a", "("]}, "is no regular expression"),
+        ({"kind": "prints_lines", "matches": ["a"], "first": "("}, "is no regular expression"),
     ],
 )
 def test_what_judges_nothing_is_refused(table: dict[str, Any], refusal: str) -> None:

@@ -27,7 +27,7 @@ from bluepill_sim.program.image import load_image
 from robot_bench.firmware.build import HERE, PROGRAMS, build_elf
 
 #: In the order in which they were drawn.
-SEEDS = (40, 41, 42)
+SEEDS = (40, 41, 42, 43)
 #: Of each program.
 COUNT = 10
 DRAWN = ("dodge", "rover")
