@@ -6,6 +6,7 @@ import shutil
 import socket
 import subprocess
 import threading
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -288,12 +289,14 @@ def test_a_real_gdb_is_stopped_by_a_pause_on_the_page(opened: GdbPort, alone: st
 
     def debug() -> None:
         with subprocess.Popen([gdb, "-q", "-nx", "-batch", "-x", str(script), str(wanted.firmware)],
-                              stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as running:  # fmt: skip
+                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as running:  # fmt: skip
             assert running.stdout is not None
             for line in running.stdout:
                 said.append(line)
                 if line.startswith("$1 = "):  # the last `continue` follows
-                    threading.Timer(0.3, live.offer, [RunCommand(do="pause")]).start()
+                    while not live.state.is_running:
+                        time.sleep(0.01)
+                    live.offer(RunCommand(do="pause"))
                 if line.startswith("pc "):
                     live.offer(RunCommand(do="speed", speed=0.0))
                     live.offer(RunCommand(do="run"))
@@ -305,7 +308,7 @@ def test_a_real_gdb_is_stopped_by_a_pause_on_the_page(opened: GdbPort, alone: st
     out = "".join(said)
     assert "Breakpoint 1, pins_motors" in out
     assert "$1 = 1" in out
-    assert "page: paused" in out
+    assert "page: paused" in out, out
     assert "SIGINT" in out
     assert re.search(r"(?m)^pc +0x", out)
     assert alone in (folder / "trace.jsonl").read_text()
