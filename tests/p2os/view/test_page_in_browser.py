@@ -45,7 +45,7 @@ SECONDS = 2
 def recording() -> ViewRecording:
     """Return a run of two seconds with rows of every kind, each of whose texts is hostile."""
     header = PageHeader(
-        title=f"run {HOSTILE}", verdict="failed", standing="failed", lead=HOSTILE, why=HOSTILE, footer=HOSTILE,
+        title=f"run {HOSTILE}", verdict="failed", standing="failed", lead=HOSTILE, why=f"{HOSTILE} at 0.250 s", footer=HOSTILE,
         end_ns=SECONDS * S, left_out=[HOSTILE],
         robots=[RobotHeader(name="", model=HOSTILE, front_m=0.2, rear_m=0.2, width_m=0.4)],
         panels=[PanelHeader(name="program", title="Program", sections=[PageSection(title=HOSTILE, blocks=[
@@ -198,6 +198,11 @@ def test_keys_move_time_cursors_and_window(seen: dict[str, Any]) -> None:
 @pytest.mark.slow
 def test_lines_of_the_program_have_run_by_the_pages_time(seen: dict[str, Any]) -> None:
     assert seen["lines"] == ["part not not none", "part ran not none"]
+
+
+@pytest.mark.slow
+def test_the_cause_leads_to_its_moment(seen: dict[str, Any]) -> None:
+    assert seen["cause"] == S // 4
 
 
 @pytest.mark.slow

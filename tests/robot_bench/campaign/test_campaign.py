@@ -350,6 +350,7 @@ def test_the_data_set_has_a_row_a_run_and_the_page_names_every_failure(tmp_path:
     assert all(plan["world"]["things"] and plan["ways"][0]["x"] for plan in plans)
     titles = [section["title"] for section in page.header["sections"]]
     assert titles[:3] == ["What came of it", "Failures", "What it cost"]
+    assert page.header["why"].startswith(f"point {whole.failures[0].number}: ")
     (over, *_) = page.section("Margins over what varied")["blocks"]
     assert sum(len(curve["x"]) for curve in over["curves"]) == len(whole.progress.rows)
 

@@ -70,6 +70,10 @@ await page.getByRole("searchbox", { name: /Filter packets/ }).fill("");
 for (const tab of found.tabs) await page.getByRole("tab", { name: tab, exact: true }).click();
 await page.getByRole("tab", { name: "3D" }).click();
 await page.waitForFunction(() => document.querySelector(".view-scene canvas") !== null, undefined, { timeout: 20000 }).catch(() => found.errors.push(`3D: no canvas`));
+// The line that says why leads to the moment that it names.
+await page.locator(".why").getByRole("button", { name: "at 0.250 s" }).click();
+found.cause = (await state(page)).now;
+
 // Which lines have run by the page's time, before and after the second one has.
 found.lines = [];
 await page.getByRole("tab", { name: "Program", exact: true }).click();

@@ -2,7 +2,7 @@
 import { describe, expect, it } from "vitest";
 import { firstFrom, lastAt } from "../src/data/search";
 import { Clock, LEAST_SPAN_NS } from "../src/time/clock";
-import { decimals, duration, frequency, moment, roundStep, tickBase, tickLabel, ticks } from "../src/time/format";
+import { decimals, duration, frequency, moment, quantity, roundStep, tickBase, tickLabel, ticks } from "../src/time/format";
 
 function clock(end = 1000): Clock {
   const made = new Clock();
@@ -134,5 +134,11 @@ describe("words of time", () => {
     expect(tickBase(43187000123, 1e6)).toBe(0);
     expect(tickLabel(43187000500, 500, base)).toBe("+500 ns");
     expect(tickLabel(2e9, 5e8, 0)).toBe("2.0 s");
+  });
+});
+
+describe("a value", () => {
+  it("is 0 below what a channel measures, and has its unit", () => {
+    expect([1.5731e-13, -9e-10, 1e-9, 0.25].map((value) => quantity(value, "m/s"))).toEqual(["0 m/s", "0 m/s", "1.0000e-9 m/s", "0.25 m/s"]);
   });
 });
