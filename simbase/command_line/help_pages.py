@@ -37,7 +37,7 @@ class VerbPage(TyperCommand):
         for word, following in pairwise([*args, ""]):
             filled.append(word)
             if word in self.usual:
-                filled += self.usual[word](args[place + 1] if place + 1 < len(args) else "")
+                filled += self.usual[word](following)
         return super().parse_args(ctx, filled)
 
     def format_help_text(self, ctx: typer.Context, formatter) -> None:  # type: ignore[no-untyped-def, override]  # noqa: ANN001 - click's or typer's own

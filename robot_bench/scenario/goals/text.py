@@ -10,7 +10,7 @@ from robot_bench.events.kinds import Event, Pose, Text
 from robot_bench.events.selection import Lines
 from robot_bench.scenario.goals.temporal import SIGNALS, never, refuse_other_than_texts
 from robot_bench.scenario.goals.watch import GoalKind, GoalOutcome, OfEvents, Watch, given_in_words, seconds
-from simbase.errors import UsageError
+from simbase.errors import UsageError, shown
 from simbase.timing import Nanos, nanos
 
 #: What sums of decimals are off by.
@@ -38,7 +38,7 @@ class Printed(Watch):
     @property
     def last(self) -> str:
         """The last line in words."""
-        return "nothing was printed" if self._line is None else f"the last line is {self._line!r}"
+        return "nothing was printed" if self._line is None else f"the last line is {shown(self._line)}"
 
 
 class InOrder(Printed):
@@ -138,7 +138,7 @@ class PrintsNumbers(Printed):
         self._count += 1
         if self._failure or not (why := self._wrong(float(found.group(1)) * self._table.times)):
             return None
-        self._failure = f"{line!r} at {seconds(event.t)}: {why}"
+        self._failure = f"{shown(line)} at {seconds(event.t)}: {why}"
         return self.finish(event.t)
 
     def _wrong(self, value: float) -> str:
@@ -192,7 +192,7 @@ class PrintsLines(Printed):
         self._has_begun = True
         if self._failure or not wrong:
             return None
-        self._failure = f"{line!r} at {seconds(event.t)}: {wrong}"
+        self._failure = f"{shown(line)} at {seconds(event.t)}: {wrong}"
         return self.finish(event.t)
 
     def finish(self, end: Nanos) -> GoalOutcome:

@@ -11,6 +11,7 @@ from p2os.errors import ScenarioError
 from robot_bench.events.kinds import Event, PinEdge, Text
 from robot_bench.scenario.goals.judging import load_goal
 from robot_bench.scenario.goals.watch import GoalOutcome
+from simbase.errors import LONGEST_SHOWN
 from tests.robot_bench.recording.records import S
 from tests.robot_bench.scenario.test_goal_kinds import MS, at, outcome
 
@@ -156,6 +157,7 @@ def test_goal_prints_numbers_within_bounds() -> None:
         (["car: go 1\n", "car: ready\n"], "'car: go 1' at 1.000 s: it begins with another line"),
         (["car: ready\n", "car: stop\n", "car: go\n"], "'car: stop' at 2.000 s: it prints no such line"),
         (["car: ready"], "no line was printed to its end; the last line is 'car: ready'"),
+        (["r" * 9999], f"no line was printed to its end; the last line is '{'r' * (LONGEST_SHOWN - 4)}..."),
     ],
 )
 def test_goal_prints_lines_that_are_known_alone(pieces: list[str], says: str) -> None:
