@@ -10,13 +10,13 @@ Invariant: what is read equals what was kept, or nothing is read; a run without 
 import hashlib
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import MISSING, fields, is_dataclass, replace
-from functools import cache, partial
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from types import NoneType, UnionType
-from typing import Any, Literal, Union, cast, get_args, get_origin, get_type_hints
+from typing import Any, cast
 
 import simbase
+from p2os.json_record import of_json
 from p2os.view.frames import ColumnValues, FrameError, LaterText, ViewFrame, frames_in
 from p2os.view.header import PageHeader, PageSection
 from p2os.view.packet_rows import PacketRows
@@ -70,7 +70,7 @@ def kept(folder: Path) -> ViewRecording | None:
         if json.loads(line) != {**_made_of(folder), "sha256": hashlib.sha256(body).hexdigest()}:
             return None
         head, _, rows = body.partition(b"\n")
-        header = cast("PageHeader", _value(PageHeader, json.loads(head)))
+        header = cast("PageHeader", of_json(PageHeader, json.loads(head)))
         return _recording(header, list(frames_in(rows)))
     except (P2osError, ValueError, KeyError, TypeError, IndexError, RecursionError):  # FrameError is a P2osError
         return None
@@ -127,50 +127,3 @@ def _read_packets(track: ChannelTrack, frame: ViewFrame, robot: str) -> None:
     ]
     columns = t, senders, data, names, [one for one, _ in texts], [one for _, one in texts], are_bad
     track.take_columns(cast("tuple[ColumnValues, ...]", columns))
-
-
-def _value(hint: object, value: object) -> object:
-    """Return what JSON has of a type: of a record of the header, of what stands in its fields.
-
-    Raises:
-        ValueError, TypeError, KeyError: It is none.
-    """
-    origin = get_origin(hint)
-    if isinstance(hint, type) and is_dataclass(hint):
-        hints = _hints(hint)
-        return hint(**{name: _value(hints[name], one) for name, one in cast("dict[str, object]", value).items()})
-    if origin is Literal:
-        if value not in get_args(hint):
-            raise ValueError(f"{value!r} is none of {get_args(hint)}")
-        return value
-    if origin in {Union, UnionType}:
-        return _one_of(get_args(hint), value)
-    if origin is tuple and get_args(hint)[-1] is not Ellipsis:
-        return tuple(_value(one, cell) for one, cell in zip(get_args(hint), cast("list[object]", value), strict=True))
-    if origin is not None:
-        return tuple(_value(get_args(hint)[0], cell) for cell in cast("list[object]", value))
-    wanted = (int, float) if hint is float else hint
-    if not isinstance(value, cast("type", wanted)):
-        raise TypeError(f"{value!r} is no {hint}")
-    return value
-
-
-def _one_of(hints: Sequence[Any], value: object) -> object:
-    if value is None and NoneType in hints:
-        return None
-    others = [one for one in hints if one is not NoneType]
-    if len(others) == 1:
-        return _value(others[0], value)
-    kind = cast("dict[str, object]", value)["kind"]
-    return _value(next(one for one in others if _kind_of(one) == kind), value)
-
-
-@cache
-def _hints(record: type) -> dict[str, object]:
-    return get_type_hints(record)
-
-
-@cache
-def _kind_of(record: Any) -> object:
-    found = {field.name: field.default for field in fields(record)}["kind"]
-    return None if found is MISSING else found

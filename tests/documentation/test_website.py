@@ -115,7 +115,7 @@ def test_statements_are_parted_where_they_end_and_not_in_brackets() -> None:
 
 def test_statements_of_a_list_are_those_of_its_item_or_of_the_mark_before_it() -> None:
     items = "- *Chosen*: one\n  more. Not modelled: two.\n- Free.\n"
-    text = f"## X\n\n{items}\n*Chosen* for pins:\n\n- three; four.\n\nOther.\n"
+    text = f"## X\n\n`peripherals/x.py`; RM0008 1.\n\n{items}\n*Chosen* for pins:\n\n- three; four.\n\nOther.\n"
     (model,) = fidelity.models(text)
     assert model.chosen == ("one more", "for pins: three", "for pins: four")
     assert model.not_modelled == ("two",)

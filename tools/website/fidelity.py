@@ -17,9 +17,11 @@ from tests.bluepill_sim.peripherals.sequences.table import ROWS
 ROOT = Path(__file__).resolve().parents[2]
 SECTION = re.compile(r"^## (?P<title>.+?)$(?P<text>.*?)(?=^## |\Z)", re.MULTILINE | re.DOTALL)
 #: What begins a paragraph or an item of a list that says more than what is modelled.
-MARK = re.compile(r"\*?(?P<kind>chosen|not modelled)\*?(?P<more>[^:.*]{0,40}):\s*", re.IGNORECASE)
+MARK = re.compile(r"\*{0,2}\b(?P<kind>chosen|not modelled)\*{0,2}(?P<more>[^:.*]{0,40}):\s*", re.IGNORECASE)
 #: A choice within a sentence.
 ASIDE = re.compile(r"\(\*chosen\*: (?P<said>[^()]*(?:\([^()]*\)[^()]*)*)\)")
+#: How docs/silicon.md writes that silicon has shown nothing yet.
+NOTHING = {"–": "nothing"}
 #: Sources of a robot's numbers, as its file's comments name them.
 SOURCES = ("ARIA", "player", "MobileSim", "manual", "RosAria", "AMRISim")
 _HEAD = """# Fidelity
@@ -66,18 +68,27 @@ def models(text: str) -> Iterator[DataSheet]:
     """Yield the models of the page of data sheets: its sections that name a source file of a peripheral."""
     for section in SECTION.finditer(text):
         said: dict[str, list[str]] = {"chosen": [], "not modelled": []}
-        modelled = 0
         about, *items = re.split(r"\n\s*\n|\n(?=- )", section["text"].strip())
         if not re.match(r"`(?:peripherals|fabric)/", about):
             continue
+        modelled, below = 0, ""  # what a mark at the end of a paragraph says of the list below it
         for item in items:
-            words = " ".join(item.removeprefix("- ").split())
+            words, listed = " ".join(item.removeprefix("- ").split()), item.startswith("- ")
             said["chosen"] += [aside["said"] for aside in ASIDE.finditer(words)]
-            if mark := MARK.match(words):
-                more = f"{mark['more'].strip(' ,')}: " if mark["more"].strip(" ,") else ""
-                said[mark["kind"].lower()] += [more + one for one in statements(words[mark.end() :])]
-            else:
-                modelled += item.startswith("- ")
+            words = ASIDE.sub("", words)
+            marks = list(MARK.finditer(words))
+            if below and listed and not marks:
+                kind, _, more = below.partition(":")
+                said[kind] += [more + one for one in statements(words)]
+                continue
+            below = ""
+            modelled += listed and not (marks and marks[0].start() == 0)
+            ends = [*(one.start() for one in marks), len(words)][1:]
+            for mark, end in zip(marks, ends, strict=True):
+                kind, more = mark["kind"].lower(), f"{mark['more'].strip(' ,')}: " if mark["more"].strip(" ,") else ""
+                found = statements(words[mark.end() : end])
+                said[kind] += [more + one for one in found]
+                below = "" if found else f"{kind}:{more}"
         title = section["title"]
         yield DataSheet(title, slug(title), modelled, tuple(said["chosen"]), tuple(said["not modelled"]))
 
@@ -104,7 +115,7 @@ def silicon() -> dict[str, tuple[str, str]]:
         r"^\| ([^|]+) \| [^|]*\(peripherals\.md#([\w-]+)\)[^|]* \| ([^|]*) \| ([^|]*) \|$",
         (ROOT / "docs" / "silicon.md").read_text(encoding="utf-8"), re.MULTILINE,
     )  # fmt: skip
-    return {name.strip(): (shown.strip(), kit.strip()) for name, _, shown, kit in rows}
+    return {name.strip(): (NOTHING.get(shown.strip(), shown.strip()), kit.strip()) for name, _, shown, kit in rows}
 
 
 def family(title: str) -> set[str]:

@@ -45,7 +45,8 @@ SECONDS = 2
 def recording() -> ViewRecording:
     """Return a run of two seconds with rows of every kind, each of whose texts is hostile."""
     header = PageHeader(
-        title=f"run {HOSTILE}", verdict="failed", standing="failed", lead=HOSTILE, why=f"{HOSTILE} at 0.250 s", footer=HOSTILE,
+        title=f"run {HOSTILE}", verdict="failed", standing="failed", lead=HOSTILE, why=f"{HOSTILE} at 0.250 s",
+        footer=HOSTILE,
         end_ns=SECONDS * S, left_out=[HOSTILE],
         robots=[RobotHeader(name="", model=HOSTILE, front_m=0.2, rear_m=0.2, width_m=0.4)],
         panels=[PanelHeader(name="program", title="Program", sections=[PageSection(title=HOSTILE, blocks=[
