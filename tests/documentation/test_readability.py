@@ -5,10 +5,7 @@ import pytest
 from tests.documentation.readability import CELL, LONGEST, MAP_WORDS, MEAN, ROOT, Reading, faults, read_pages
 
 #: Pages that break a rule still: mean and longest sentence, wide cells, phrases of ours. A figure may only fall.
-CEILINGS = {
-    "docs/adapter-firmware.md": (17.5, 50, 9, 5),
-    "docs/board-simulation.md": (7.1, 24, 0, 1),
-}  # fmt: skip
+CEILINGS: dict[str, tuple[float, int, int, int]] = {}
 PAGES = read_pages()
 BOUNDS = (MEAN, LONGEST, 0, 0)
 

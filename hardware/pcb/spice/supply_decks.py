@@ -141,7 +141,7 @@ Resp {node(design, "U2.5V")} 0 10
                       ("wrong", -0.3, 0.1, "V", "the same with the bank the wrong way round"),
                       ("back", -0.1, 0.1, "V", "what reaches the 12 V terminal")),
         traces=(("v(bank)", "bank"), (f"v({esp})", "5V of the ESP32")), x_label="bank, V", y_label="V",
-        cannot_say="A bank's own limits and cable: the deck's source gives what is asked of it.",
+        cannot_say="A bank's own limits and cable: the deck's source gives the demands on it.",
     )  # fmt: skip
 
 
