@@ -32,7 +32,6 @@ from robot_bench.bench.board import (
 )
 from robot_bench.bench.far_end import make_far_end
 from robot_bench.bench.hand_driven_body import HandDrivenBody
-from robot_bench.bench.lone_board import NOWHERE
 from robot_bench.bench.origin import LATER, origin_of, refuse_others
 from robot_bench.bench.waiting import EventWait
 from robot_bench.direct.differential.robot import DifferentialRobot
@@ -51,6 +50,7 @@ from robot_bench.scenario.hands.doing import Doing
 from robot_bench.scenario.loading import refuse_what_its_world_refuses
 from robot_bench.scenario.scenario import Scenario
 from robot_bench.scenario.trigger_script import TriggerScript
+from robot_bench.scenario.wired_robots import NOWHERE
 from robot_bench.scenario.world_script import WorldScript
 from robot_bench.wires.chip_pins import ChipPins
 from robot_bench.wires.line_ends import AdapterPart, ControllerPart

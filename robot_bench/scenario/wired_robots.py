@@ -15,6 +15,7 @@ from typing import Protocol, cast
 from bluepill_sim.stm32f103 import BONDED_PINS
 from p2os.errors import ScenarioError
 from p2os.pioneer.body.contract import RobotBody
+from p2os.pioneer.world.model import Pose, World
 from p2os.robots.parameters import RobotParameters
 from p2os.toml_file import TomlSource, is_file, read_toml, read_user_text
 from p2os.toml_record import table_of
@@ -52,6 +53,10 @@ class WiredPart(Timed, Protocol):
 
 #: The kind of what is no robot: the pins of a board by itself.
 NO_ROBOT = "none"
+#: Where nothing is.
+NOWHERE = World(
+    name="", source="", description="", start=Pose(0.0, 0.0, 0.0), extent=(-1.0, -1.0, 1.0, 1.0), obstacles=()
+)
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,11 +16,11 @@ from bluepill_sim.parts.registry import parse_part
 from p2os.cli.main import run as p2os
 from p2os.view.run_control import RunCommand
 from robot_bench.bench import Bench
-from robot_bench.bench.lone_board import board_scenario
 from robot_bench.cli.debugging.hands import hand_of
 from robot_bench.cli.debugging.session import RunSession
 from robot_bench.cli.shown import lone_board
 from robot_bench.cli.shown.live_run import LiveRun
+from robot_bench.cli.shown.lone_board import board_scenario
 from robot_bench.cli.shown.offered_hands import hands_of
 from robot_bench.events.kinds import PinEdge, Pose, Text
 from simbase.errors import UsageError
