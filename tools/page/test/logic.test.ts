@@ -98,6 +98,17 @@ describe("search in a long run", () => {
   });
 });
 
+describe("search along a wire that no view has asked for", () => {
+  const rows: readonly [number, number][] = [[0, 0], [500, 1], [502, 0], [900, 1]];
+  it.each([["nothing of it is here", undefined], ["a part of it is here", [800, 1000]]] as const)("where %s", async (_, part) => {
+    const piece = (from: number, to: number) => levels(rows.filter(([t]) => t >= from && t <= to), { from, to });
+    const run = store([channel(0, "levels")], 1000, { ask: ({ from_ns, to_ns }, answered) => { run.receive([piece(from_ns, to_ns)]); answered(true); } });
+    if (part) run.receive([piece(...part)]);
+    expect(await find(run, 0, 1000, -1, { what: "shorter", ns: 10 })).toBe(500);
+    expect(await find(run, 0, 500, 1, { what: "shorter", ns: 2 })).toBeUndefined();
+  });
+});
+
 describe("a pulse", () => {
   it("is measured with its period", () => {
     const wire = levels([[0, 0], [10, 1], [25, 0], [40, 1]], { to: 100 });

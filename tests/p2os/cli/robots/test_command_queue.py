@@ -81,3 +81,11 @@ def test_stops_come_before_what_waited_and_drop_what_was_to_be_driven() -> None:
     for command in (pause, drive, STOP, LET_GO, drive):
         assert queue.offer(command)
     assert [queue.take() for _ in range(5)] == [STOP, LET_GO, pause, drive, None]
+
+
+def test_each_of_several_robots_that_is_to_stand_is_told_so() -> None:
+    waiting = CommandQueue()
+    for robot in ("east", "west", "east"):
+        assert waiting.offer(RunCommand(do="drive", robot=robot))
+    assert [one.robot for one in (waiting.take(), waiting.take()) if one is not None] == ["east", "west"]
+    assert waiting.take() is None

@@ -43,7 +43,7 @@ const MOST_REQUESTS = 400;
 
 /** As `findIn`, over the whole run: of what is here reduced, exact rows are asked for piece by piece. */
 export async function find(store: Store, channel: number, t: number, way: 1 | -1, sought: Sought): Promise<number | undefined> {
-  const { start_ns, end_ns } = store.header.peek(), all = store.rows(channel, start_ns, end_ns);
+  const { start_ns, end_ns } = store.header.peek(), all = await store.exact(channel, start_ns, end_ns); // of a wire out of sight nothing is here
   if (!all) return undefined;
   if (!all.isReduced || !store.canAsk) return findIn(all, t, way, sought);
   let width = Math.max(1000, ((end_ns - start_ns) * 2000) / Math.max(1, all.of)), at = t;
