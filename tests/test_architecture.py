@@ -111,7 +111,8 @@ LAYERS = {
         ("files", "units", "c_library"), ("trust",), ("user_classes",), ("command_line",),
     ),
     "p2os": (
-        ("errors", "event_log"), ("toml_file",), ("toml_schema",), ("toml_record", "json_record"), ("robots", "gamepad"),
+        ("errors", "event_log"), ("toml_file",), ("toml_schema",), ("toml_record", "json_record"),
+        ("robots", "gamepad"),
         ("protocol",), ("transport",),
         ("capture", "client", "pioneer"), ("ros", "view"), ("cli",), ("__main__",),
     ),

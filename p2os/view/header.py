@@ -148,6 +148,8 @@ class FaultOffer:
 class HandsOffer:
     """What hands can do in what is shown, beside moving its things."""
 
+    #: Of several robots the one that it is for; empty: the only one.
+    robot: str = ""
     faults: Sequence[FaultOffer] = ()
     #: Of the robot, to be pressed.
     buttons: Sequence[str] = ()
@@ -370,6 +372,8 @@ class PageHeader:
     robots: Sequence[RobotHeader] = ()
     #: What hands can do; None: nothing.
     hands: HandsOffer | None = None
+    #: Of several robots, to each; the first of them is `hands`.
+    robot_hands: Sequence[HandsOffer] = ()
     sections: Sequence[PageSection] = ()
     #: Of a run that goes on.
     panels: Sequence[PanelHeader] = ()

@@ -45,6 +45,8 @@ class RunCommand:
     words: str = ""
     #: A future's name; of `fork` the one that it leaves, empty: the chosen one.
     future: str = ""
+    #: Of several robots the one that `hand` and `drive` are for; empty: the only one, or the first.
+    robot: str = ""
     #: Of a place to halt at.
     number: int = 0
     #: Of `drive`: m/s ahead, and degrees a second counter-clockwise. It has to come again and again (`DRIVE_HOLD_NS`).
@@ -64,8 +66,8 @@ COMMANDS: Mapping[str, frozenset[str]] = {
     "choose": frozenset({"future"}),
     "drop": frozenset({"future"}),
     "compare": frozenset({"future"}),
-    "hand": frozenset({"at_ns", "words"}),
-    "drive": frozenset({"forward_mps", "turn_dps"}),
+    "hand": frozenset({"at_ns", "words", "robot"}),
+    "drive": frozenset({"forward_mps", "turn_dps", "robot"}),
     "stop": frozenset(),
     "save": frozenset({"words"}),
     "halt_at": frozenset({"words"}),
@@ -193,7 +195,7 @@ def _is_within(value: object, most: float) -> bool:
 
 
 _CHECKS: Mapping[str, Callable[[object], bool]] = {
-    "do": _is_text, "words": _is_text, "future": _is_text, "speed": _is_speed,
+    "do": _is_text, "words": _is_text, "future": _is_text, "robot": _is_text, "speed": _is_speed,
     "at_ns": _is_count, "number": _is_count,
     "forward_mps": lambda value: _is_within(value, MOST_MPS), "turn_dps": lambda value: _is_within(value, MOST_DPS),
     "unit": lambda value: value in get_args(StepUnit),

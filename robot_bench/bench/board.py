@@ -136,7 +136,7 @@ def do_by_hand(action: Action, chip: LeadingChip, harness: Harness, body: RobotB
 
     Raises:
         WorldError: The robot is carried to where there is no room.
-        UsageError: It is driven, and shares its world.
+        UsageError: It is driven, and is there.
     """
     if action.pose is not None:
         body.stand_at(action.pose.x_m, action.pose.y_m, action.pose.heading_rad)

@@ -20,7 +20,7 @@ class HandDrivenBody:
     """A body that a hand may drive.
 
     Args:
-        inner: The body; one that is alone in its world.
+        inner: The body. One that shares its world is stepped with the others, with `rims` in place of its set-points.
         track_m: From wheel to wheel.
     """
 
@@ -49,6 +49,11 @@ class HandDrivenBody:
         self._meet()
 
     # As a body.
+
+    @property
+    def rims(self) -> tuple[float, float] | None:
+        """The rim speeds that a hand wants, left and right, m/s, whatever set-points say; None: nobody drives."""
+        return self._rims
 
     @property
     def is_powered(self) -> bool:
@@ -117,8 +122,8 @@ def hand_driven(body: RobotBody) -> HandDrivenBody:
     """Return what a hand drives a body by.
 
     Raises:
-        UsageError: It shares its world with others, which are stepped together.
+        UsageError: It is a robot that is there.
     """
     if not isinstance(body, HandDrivenBody):
-        raise UsageError("robots that share a world are not driven by hand", hint="a scenario with one robot")
+        raise UsageError("a robot at a port is not driven by hand in a run", hint="p2os teleop URL")
     return body

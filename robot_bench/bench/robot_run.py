@@ -117,7 +117,7 @@ class RobotRun(Stateful):
             refuse_what_its_world_refuses(scenario, world)
         if scenario.robots:
             raise TypeError("a scenario with several robots has a bench each: Bench.from_scenario, or Bench.together")
-        body = body_of(scenario, world) if shared is None else shared.body_of(scenario.name)
+        body = body_of(scenario, world, shared)
         chip = chip or boot(scenario)
         own = scenario.own_robot
         self.harness = harness = make_harness(pinout) if own is None else make_own_harness(own.robot.signals)
@@ -176,9 +176,10 @@ class RobotRun(Stateful):
         robot = self._robots[-1]
         if isinstance(robot, DifferentialRobot):
             robot.is_stepped_by_others = True
-        self._shared.join(self.scenario.name, self, cast("SharedRobot", self.parts.pioneer or robot))
-        for body in self._shared.scene.bodies:
-            if body is not self.parts.body:
+        driven = cast("SharedRobot", self.parts.pioneer or robot)
+        self._shared.join(self.scenario.name, self, driven, cast("HandDrivenBody", self.parts.body))
+        for name, body in zip(self._shared.names, self._shared.scene.bodies, strict=True):
+            if name != self.scenario.name:
                 self.recorder.watch_robot(body)
 
     @property
@@ -381,8 +382,11 @@ class RunningBench(ABC):
         """Return the time that the chip has come to, ns."""
 
 
-def body_of(scenario: Scenario, world: World) -> RobotBody:
-    """Return the body of a scenario's robot alone in a world, standing where it begins."""
+def body_of(scenario: Scenario, world: World, shared: SharedWorld | None = None) -> RobotBody:
+    """Return the body of a scenario's robot, standing where it begins: alone in a world, or in one that is shared."""
     start, robot = scenario.start or world.start, scenario.parameters
-    body = make_body(scenario.body, world, robot, start=start, seed=scenario.seed, trust=False)
+    if shared is None:
+        body = make_body(scenario.body, world, robot, start=start, seed=scenario.seed, trust=False)
+    else:
+        body = shared.body_of(scenario.name)
     return cast("RobotBody", HandDrivenBody(body, robot.track_mm / 1000))

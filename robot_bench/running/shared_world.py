@@ -34,6 +34,14 @@ class SharedRobot(Protocol):
         """Take the wheels' angles after a step that was made with `next_setpoints`."""
 
 
+class HandOnWheels(Protocol):
+    """A hand that may turn the wheels of such a robot; a part of the robot's own state."""
+
+    @property
+    def rims(self) -> tuple[float, float] | None:
+        """The rim speeds that it wants in place of the set-points, m/s; None: it lets the robot drive."""
+
+
 class BenchMember(Protocol):
     """The run of one of the robots."""
 
@@ -62,7 +70,7 @@ class SharedWorld(Stateful):
 
     STATE = ("scene", "now", "_at", "_pings", "_own")
     #: Who they are is settled when they are built.
-    DERIVED = ("members", "_driven")
+    DERIVED = ("members", "_driven", "_in_hand")
 
     def __init__(self, scene: RobotScene, names: Sequence[str]) -> None:
         self.scene = scene
@@ -72,6 +80,7 @@ class SharedWorld(Stateful):
         self.members: dict[str, BenchMember] = {}
         self._own: tuple[BenchMember, ...] = ()
         self._driven: dict[int, SharedRobot] = {}
+        self._in_hand: dict[int, HandOnWheels] = {}
         self._pings = PingTable(scene.bodies)
         #: The time until which all has happened, and where the scene stands.
         self.now: Nanos = 0
@@ -81,12 +90,12 @@ class SharedWorld(Stateful):
         """Return a robot's body."""
         return self.scene.bodies[self.names.index(name)]
 
-    def join(self, name: str, member: BenchMember, driven: SharedRobot) -> None:
-        """Take the run of a robot, and what drives its body."""
+    def join(self, name: str, member: BenchMember, driven: SharedRobot, hand: HandOnWheels) -> None:
+        """Take the run of a robot, what drives its body, and the hand that may drive it in place of that."""
         number = self.names.index(name)
         self.members[name] = member
         self._own = (*self._own, member)
-        self._driven[number] = driven
+        self._driven[number], self._in_hand[number] = driven, hand
         if isinstance(driven, Pioneer):
             driven.hears = self._pings.ears_of(number)
 
@@ -118,11 +127,11 @@ class SharedWorld(Stateful):
         self.now = max(self.now, limit)
 
     def _step(self) -> None:
-        still = (0.0, 0.0)
-        setpoints = [
-            self._driven[number].next_setpoints() if number in self._driven else still
-            for number in range(len(self.names))
-        ]
+        setpoints = [(0.0, 0.0)] * len(self.names)
+        for number, driven in self._driven.items():
+            own = driven.next_setpoints()  # its ramps go on under a hand, too
+            by_hand = self._in_hand[number].rims
+            setpoints[number] = own if by_hand is None else by_hand
         wheels = self.scene.step(setpoints)
         self._at += self.scene.dt_ns
         for number, driven in self._driven.items():

@@ -39,6 +39,17 @@ def test_a_dip_starts_the_ten_milliseconds_anew() -> None:
     assert level.take(True, 24 * MS)
 
 
+def test_after_a_reset_high_has_to_last_anew() -> None:
+    level = Debounce(10 * MS, 10 * MS)
+    level.take(True, 0)
+    level.take(True, 11 * MS)
+    level.reset()
+    assert not level.level
+    assert not level.take(True, 12 * MS)
+    assert not level.take(True, 22 * MS)
+    assert level.take(True, 22 * MS + 1)
+
+
 def test_a_word_is_taken_at_its_third_sample_of_five() -> None:
     window = Majority(5)
     assert [window.take((6,)) for _ in range(4)] == [False, False, True, False]

@@ -89,7 +89,7 @@ def test_simulate_prints_figures_and_renews_the_page(capsys, monkeypatch, tmp_pa
     assert capsys.readouterr().out.splitlines() == [
         "FAIL  simulation  d  top 2.5 V", "0 ok, 1 failed, 0 skipped", "page.md: 1 simulations",
     ]  # fmt: skip
-    assert "| highest | 2.5 V | 1 to 2 |" in (tmp_path / "page.md").read_text(encoding="utf-8")
+    assert "| highest | 2.5 V | 1 … 2 |" in (tmp_path / "page.md").read_text(encoding="utf-8")
 
 
 def test_simulate_without_ngspice_says_so(capsys, monkeypatch) -> None:

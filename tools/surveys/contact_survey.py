@@ -129,7 +129,8 @@ def judged_states(
     stands = [state.stalled_left and state.stalled_right for state in states]
     blocked = [_rim(state) < BLOCKED_SHARE * COMMAND_MPS for state in states]
     rests = [max(_rim(state), speed) <= RESTING_MPS for state, speed in zip(states, speeds, strict=True)]
-    decided = round(DECIDED_S / LOOK_S) - 1  # the first state is a look after the touch
+    # The first state is a look after the touch.
+    decided = min(round(DECIDED_S / LOOK_S), len(states)) - 1
     undecided = [
         state.in_contact and not slide and not stall for state, slide, stall in zip(states, slides, stalls, strict=True)
     ]

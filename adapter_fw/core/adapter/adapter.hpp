@@ -140,7 +140,6 @@ class Adapter final : private p2os::ClientListener {
   void session_opened(const p2os::Identity& robot, Nanos now) override;
   void session_ended(p2os::EndReason reason, Nanos now) override;
   void take_sip(const p2os::Sip& sip, Nanos now) override;
-  void take_packet(p2os::Bytes, Nanos) override {}
 
   Nanos run(Nanos limit);
   void act(Nanos now);

@@ -159,9 +159,6 @@ void Client::take_open_packet(Bytes payload, Nanos now) {
   has_received_ = true;
   due_ = now + settings_.liveness_ns;
   if (!is_sip_kind(kind)) {
-    if (listener_) {
-      listener_->take_packet(payload, now);
-    }
     return;
   }
   Sip sip;

@@ -64,8 +64,6 @@ class ClientListener {
   //: The session was lost (STOP and VEL 0 are the next frames out), or could not be opened.
   virtual void session_ended(EndReason reason, Nanos now) = 0;
   virtual void take_sip(const Sip& sip, Nanos now) = 0;
-  //: Any other sound packet of an open session: type byte and data.
-  virtual void take_packet(Bytes payload, Nanos now) = 0;
 
  protected:
   ~ClientListener() = default;

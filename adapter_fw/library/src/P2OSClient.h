@@ -63,7 +63,6 @@ class P2OSClient : private p2os::ClientListener {
   void session_opened(const p2os::Identity& robot, p2os::Nanos now) override;
   void session_ended(p2os::EndReason reason, p2os::Nanos now) override;
   void take_sip(const p2os::Sip& sip, p2os::Nanos now) override;
-  void take_packet(p2os::Bytes, p2os::Nanos) override {}
   p2os::Nanos now();
   void send_speeds(p2os::Nanos now);
 

@@ -48,7 +48,7 @@ class CommandQueue:
             self._others.remove(waiting)
         if command.do == "stop":
             self._stops.clear()  # what came before it changes nothing
-        if not self._stops or self._stops[-1].do != command.do:
+        if not any((one.do, one.robot) == (command.do, command.robot) for one in self._stops):
             self._stops.append(command)
 
     def take(self, wait_s: float = 0.0) -> RunCommand | None:

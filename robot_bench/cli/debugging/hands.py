@@ -38,6 +38,17 @@ def hand_of(words: str, at: Nanos, bench: Bench) -> Hand:
     return replace(found, words=words.strip())
 
 
+def saved_as(words: str) -> str:
+    """Return as what hands are to be saved.
+
+    Raises:
+        UsageError: As neither a scenario nor a test.
+    """
+    if words not in {"scenario", "test"}:
+        raise UsageError(f"hands are not saved as {words!r}", hint="scenario or test")
+    return words
+
+
 def drive_words(speeds: tuple[float, float]) -> str:
     """Return the words of wheels that turn so: m/s ahead, degrees a second counter-clockwise."""
     return f"drive {speeds[0]:.3f} {speeds[1]:.1f}"

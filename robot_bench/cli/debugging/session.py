@@ -28,7 +28,7 @@ from p2os.view.run_control import (
 )
 from robot_bench.bench import Bench
 from robot_bench.cli.debugging.future import SLICE_NS, THE_END, Future, Halted
-from robot_bench.cli.debugging.hands import drive_words, driven_by
+from robot_bench.cli.debugging.hands import drive_words, driven_by, saved_as
 from robot_bench.cli.debugging.holds import Holds
 from robot_bench.cli.debugging.points import HaltPoint, point_of
 from robot_bench.events.words import distinguishing_words, what_of
@@ -392,9 +392,7 @@ class RunSession:
             self._hand(RunCommand(do="hand", words=drive_words(self._speeds or (0.0, 0.0))))
 
     def _save(self, command: RunCommand) -> None:
-        if command.words not in {"scenario", "test"}:
-            raise UsageError(f"hands are not saved as {command.words!r}", hint="scenario or test")
-        self._saved = self._recorder.saved(self._chosen, command.words)
+        self._saved = self._recorder.saved(self._chosen, saved_as(command.words))
 
     def _choose(self, command: RunCommand) -> None:
         self._speeds = None

@@ -1,28 +1,37 @@
 """Robots that share a world, for whoever looks on while they run: all of them live, let go, halted, slowed and stepped.
 
 They have no snapshot of their own that is cheap enough to keep many of: what is known is not gone back over, and there
-are no forks and no hands.
+are no forks. What hands do is written into the run's folder at once, as a scenario that is that run without a page.
 
-Invariant: the traces are those of robots at which nobody looks.
+Invariant: the traces are those of robots at which nobody looks, with what hands have done in them.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from p2os.cli.robots.command_queue import CommandQueue
 from p2os.transport.wall_clock import Clock, wall_clock
 from p2os.view.header import PageHeader, PageSection, PanelHeader, PanelState
 from p2os.view.live import LiveRecording
 from p2os.view.recording import ViewRecording
-from p2os.view.run_control import RunCommand, RunState
+from p2os.view.run_control import HandState, RunCommand, RunState
 from p2os.view.targets import ViewPanel, panels_of
 from robot_bench.bench import Bench, run_of
+from robot_bench.cli.debugging.hands import saved_as
+from robot_bench.cli.debugging.session import MOST_HANDS
+from robot_bench.cli.shown.fleet_hands import FleetHands
 from robot_bench.cli.shown.looked_panels import LookedPanels
+from robot_bench.cli.shown.offered_hands import hands_of
+from robot_bench.cli.shown.saved_hands import saved_beside, scenario_text
 from robot_bench.events.codec import Blocks, Json, Recorded
+from robot_bench.recording.run_folder import HANDS_NAME
 from robot_bench.report.run_page import lead_of
 from robot_bench.run import meta_of
 from robot_bench.scenario.scenario import Scenario
 from robot_bench.view.run_tracks import RunTracks, add_events
+from simbase.errors import P2osError
+from simbase.files import write_text
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 
 #: chosen: of the clock, between two looks at what is asked for.
@@ -64,7 +73,10 @@ class LiveFleet:
         self, scenario: Scenario, *, speed: float = 1.0, on_wait: Callable[[], None] = lambda: None,
         clock: Clock = wall_clock,
     ) -> None:  # fmt: skip
-        self._recording = ViewRecording(PageHeader(title=scenario.name))
+        offers = [replace(hands_of(one), robot=one.name) for one in scenario.programmed]
+        self._scenario = scenario
+        self._run_folder: Path | None = None
+        self._recording = ViewRecording(PageHeader(title=scenario.name, hands=offers[0], robot_hands=offers))
         self._tracks: dict[str, RunTracks] = {}
         self._blocks: dict[str, Blocks] = {}
         self._on_wait, self._clock = on_wait, clock
@@ -72,9 +84,14 @@ class LiveFleet:
         self._commands = CommandQueue()
         self._state = RunState(is_running=True, speed=speed)
         self._panels = LookedPanels(())
+        self._hands = FleetHands({}, 0)
         #: Until when it runs though it stands still: a step; and the clock and the time at which its pace began.
         self._step_until: Nanos | None = None
         self._base: tuple[Nanos, Nanos] | None = None
+        self._doing: Mapping[str, Callable[[RunState, RunCommand, Nanos], RunState]] = {
+            "run": self._run, "pause": self._pause, "speed": self._set_speed, "step": self._step, "hand": self._hand,
+            "drive": self._drive, "stop": self._drive, "save": self._save,
+        }  # fmt: skip
         #: What a server shows.
         self.source: LiveRecording[FleetBuilt | RobotReleased] = LiveRecording(self._recording, self._add)
         self.source.control = self
@@ -110,14 +127,23 @@ class LiveFleet:
         self.source.offer(FleetBuilt(metas, [one.header for one in self._panels.panels]), 0, is_kept=True)
         for name, bench in benches.items():
             self._record(name, bench)
+        self._hands = FleetHands(benches, self._end_ns)
         first = next(iter(benches.values()))
+        if first.trace.path is not None:
+            self._run_folder = first.trace.path.parent.parent
         while first.now < min(first.end, self._end_ns):
             self._turn(first)
         self._show(replace(self._state, is_running=False, why="the run is over", head_ns=first.now))
         self.source.end()
 
     def _record(self, name: str, bench: Bench) -> None:
+        known: Nanos = -1
+
         def take(events: Sequence[Recorded], limit: Nanos) -> None:
+            nonlocal known
+            if limit <= known:  # a hand could do nothing: it comes by the same again
+                return
+            known = limit
             if events:
                 self.source.offer(RobotReleased(name, events), limit)
             else:
@@ -134,6 +160,7 @@ class LiveFleet:
             state = replace(state, why="a millisecond on")
             wait_s = 0.0
         elif state.is_running:
+            state = self._by_hand(state, lambda: self._hands.drive_on(now))
             wait_s = self._go_on(first, now, state.speed)
         else:
             wait_s = _WAIT_S
@@ -142,7 +169,7 @@ class LiveFleet:
         if wait_s:
             self._on_wait()
         if (command := self._commands.take(wait_s)) is not None:
-            self._show(replace(self._done(command, first.now), done=self._state.done + 1))
+            self._show(replace(self._done(command, first.now), head_ns=first.now, done=self._state.done + 1))
 
     def _go_on(self, first: Bench, now: Nanos, speed: float) -> float:
         """Run as far as the pace has come; return for how many seconds nothing is to be done."""
@@ -159,23 +186,58 @@ class LiveFleet:
 
     def _done(self, command: RunCommand, now: Nanos) -> RunState:
         """Do what was asked for; return how it stands then."""
-        state = replace(self._state, trouble="")
+        state = replace(self._state, trouble="", saved="")
         if command.at_ns is not None and command.at_ns < now:
             return replace(state, trouble="robots that share a world are not set back: they go on from where they are")
-        if command.do == "run":
-            self._base = None
-            return replace(state, is_running=True, why="")
-        if command.do == "pause":
-            return replace(state, is_running=False, why="paused")
-        if command.do == "speed":
-            self._base = None
-            return replace(state, speed=command.speed)
-        if command.do == "step" and command.unit == "millisecond":
-            self._step_until = now + _STEP_NS
-            return replace(state, is_running=False)
-        return replace(
-            state, trouble="robots that share a world are let go, halted and stepped by the millisecond alone"
-        )
+        doing = self._doing.get(command.do)
+        if doing is None or (command.do == "step" and command.unit != "millisecond"):
+            what = "let go, halted, stepped by the millisecond, and changed by hand alone"
+            return replace(state, trouble=f"robots that share a world are {what}")
+        return doing(state, command, now)
+
+    def _run(self, state: RunState, _command: RunCommand, _now: Nanos) -> RunState:
+        self._base = None
+        return replace(state, is_running=True, why="")
+
+    def _pause(self, state: RunState, _command: RunCommand, _now: Nanos) -> RunState:
+        return replace(state, is_running=False, why="paused")
+
+    def _set_speed(self, state: RunState, command: RunCommand, _now: Nanos) -> RunState:
+        self._base = None
+        return replace(state, speed=command.speed)
+
+    def _step(self, state: RunState, _command: RunCommand, now: Nanos) -> RunState:
+        self._step_until = now + _STEP_NS
+        return replace(state, is_running=False)
+
+    def _hand(self, state: RunState, command: RunCommand, _now: Nanos) -> RunState:
+        return self._by_hand(state, lambda: self._hands.do(command.robot, command.words))
+
+    def _drive(self, state: RunState, command: RunCommand, _now: Nanos) -> RunState:
+        return self._by_hand(state, lambda: self._hands.ask(command, self._clock()))
+
+    def _by_hand(self, state: RunState, act: Callable[[], None]) -> RunState:
+        """Have hands do something, and write down what they have done by now; what cannot be done is said."""
+        before = self._hands.done
+        try:
+            act()
+        except P2osError as error:
+            return replace(state, trouble=f"{error} ({error.hint})" if error.hint else str(error))
+        done = self._hands.done
+        if done is before:
+            return state
+        if self._run_folder is not None:
+            write_text(self._run_folder / HANDS_NAME, scenario_text(self._scenario, done, self._run_folder))
+        last = [HandState(at_ns=one.at, words=f"{one.robot}: {one.words}") for one in done[-MOST_HANDS:]]
+        return replace(state, hands=last, hand_count=len(done))
+
+    def _save(self, state: RunState, command: RunCommand, _now: Nanos) -> RunState:
+        try:
+            kind = saved_as(command.words)
+            saved = saved_beside(self._scenario, self._hands.done, self._run_folder, kind)
+            return replace(state, saved=saved)
+        except P2osError as error:
+            return replace(state, trouble=f"{error} ({error.hint})" if error.hint else str(error))
 
     def _show(self, state: RunState) -> None:
         if state != self._state:

@@ -8,8 +8,6 @@ What hands do in the run itself is written into its folder at once, as a scenari
 Invariant: nobody who looks on decides anything: the trace is the same with and without.
 """
 
-import os
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -34,7 +32,7 @@ from robot_bench.cli.debugging.gdb_beside import GdbBeside
 from robot_bench.cli.debugging.session import MAIN, RunSession
 from robot_bench.cli.shown.looked_panels import LookedPanels
 from robot_bench.cli.shown.offered_hands import hands_of
-from robot_bench.cli.shown.saved_hands import pytest_text, scenario_text
+from robot_bench.cli.shown.saved_hands import saved_beside, scenario_text
 from robot_bench.events.codec import Blocks, Json, Recorded
 from robot_bench.recording.run_folder import HANDS_NAME
 from robot_bench.report.run_page import lead_of
@@ -43,7 +41,6 @@ from robot_bench.scenario.hands.timed import Hand
 from robot_bench.scenario.scenario import Scenario
 from robot_bench.view.run_tracks import RunTracks, add_events
 from robot_bench.view.variable_track import VariableTrack
-from simbase.errors import UsageError
 from simbase.files import write_text
 from simbase.timing import Nanos
 
@@ -99,11 +96,6 @@ class VariablesSeen:
 
 
 Happened = BenchBuilt | BenchReleased | FutureForked | FutureDropped | VariablesSeen
-
-
-def _shown(path: Path) -> str:
-    """Return a path as one types it here."""
-    return os.path.relpath(path) if path.is_relative_to(Path.cwd()) else str(path)
 
 
 class LiveRun:
@@ -254,7 +246,8 @@ class LiveRun:
         session.do(command)
         if session.hands != self._written and self._run_folder is not None:
             self._written = session.hands
-            self._write(HANDS_NAME, scenario_text(self._scenario, self._written, self._run_folder))
+            text = scenario_text(self._scenario, self._written, self._run_folder)
+            write_text(self._run_folder / HANDS_NAME, text)
         self._hand_over_variables(session)
         self._show(session.state())
 
@@ -272,22 +265,6 @@ class LiveRun:
         for future, types in session.watched():
             if stretches := future.take_seen():
                 self.source.offer(VariablesSeen(future.name, stretches, types), future.known_ns)
-
-    def _place(self) -> Path:
-        """Return the run's folder.
-
-        Raises:
-            UsageError: It has none.
-        """
-        if self._run_folder is None:
-            raise UsageError("this run has no folder to write into", hint="p2os run SCENARIO --view")
-        return self._run_folder
-
-    def _write(self, name: str, text: str, *, is_beside: bool = False) -> Path:
-        place = self._place()
-        path = (place.parent if is_beside else place) / name
-        write_text(path, text)
-        return path
 
     def _show(self, state: RunState) -> None:
         if state is not self._state:
@@ -324,15 +301,8 @@ class LiveRun:
 
     def saved(self, future: Future, kind: str) -> str:
         """Write down what hands have done in a future beside the run's folder, as a scenario or a test; say where."""
-        place = self._place()
-        name = place.name if future.name == MAIN else f"{place.name}-{future.name.replace(' ', '-')}"
-        text = scenario_text(self._scenario, future.hands, place.parent)
-        file = self._write(f"{name}.toml", text, is_beside=True)
-        if kind == "scenario":
-            return f"saved: p2os run {_shown(file)}"
-        test = pytest_text(file.name, self._scenario.duration_ns)
-        module = re.sub(r"\W+", "_", name)
-        return f"saved: pytest {_shown(self._write(f'test_{module}.py', test, is_beside=True))}"
+        name = "" if future.name == MAIN else future.name
+        return saved_beside(self._scenario, future.hands, self._run_folder, kind, name)
 
     def _add(self, happened: Happened) -> None:
         if isinstance(happened, BenchBuilt):

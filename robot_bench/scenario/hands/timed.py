@@ -44,13 +44,16 @@ class Hand:
     keys: Mapping[str, object]
     #: With times counted from the beginning of the run.
     doing: Doing
+    #: Of several robots the one that it is done to; empty: the only one, or the first.
+    robot: str = ""
     #: As a person said it; empty: a file did.
     words: str = field(default="", compare=False)
 
     @property
     def table(self) -> dict[str, object]:
         """Its table in a file."""
-        return {"at_s": self.at / NS_PER_S, "do": self.do, **self.keys}
+        whose = {"robot": self.robot} if self.robot else {}
+        return {"at_s": self.at / NS_PER_S, **whose, "do": self.do, **self.keys}
 
 
 def hand_at(

@@ -7,8 +7,9 @@ import { freeName, moved, placedBox, placedCylinder, ROBOT } from "../src/hands/
 import type { App } from "../src/shell/app";
 import { signal } from "@preact/signals";
 
-const asked: { do: string; forward_mps?: number; turn_dps?: number; words?: string }[] = [], trouble = signal("");
-const app = { stops: signal(0), store: { trouble, header: signal({ hands: { most_mps: 0.5, most_dps: 90, is_real: false } }) }, ask: (command: typeof asked[number]) => asked.push(command) } as unknown as App;
+const asked: { do: string; forward_mps?: number; turn_dps?: number; words?: string; robot?: string }[] = [], trouble = signal("");
+const chosen = signal("");
+const app = { stops: signal(0), store: { trouble, header: signal({ hands: { most_mps: 0.5, most_dps: 90, is_real: false } }), get handsOffer() { return { robot: chosen.value, most_mps: 0.5, most_dps: 90 }; } }, ask: (command: typeof asked[number]) => asked.push(command) } as unknown as App;
 let driving: Driving, end: () => void;
 
 beforeEach(() => {
@@ -61,7 +62,23 @@ test("what is held is said again and again, and once that it is let go", () => {
   vi.advanceTimersByTime(1000);
   expect(asked.map((one) => one.forward_mps)).toEqual([0, 0.5, 0.5, 0.5, 0.5, 0]);
   driving.turnOn(false);
+  driving.turnOn(true);
+  driving.key("w", true);
+  driving.turnOn(false);
+  vi.advanceTimersByTime(1000);
   expect(asked.at(-1)).toEqual({ do: "hand", words: "let go wheels" });
+});
+
+test("another robot is chosen: the one that was driven stands, drives by itself again, and nothing is held", () => {
+  chosen.value = "west";
+  driving.turnOn(true);
+  driving.key("w", true);
+  chosen.value = "east";
+  expect(asked.map((one) => [one.robot, one.words ?? one.forward_mps])).toEqual([["west", 0], ["west", 0.5], ["west", "let go wheels"]]);
+  vi.advanceTimersByTime(1000);
+  driving.key("w", true);
+  expect(asked.length).toBe(3);
+  chosen.value = "";
 });
 
 test.each([

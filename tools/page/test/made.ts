@@ -32,7 +32,7 @@ export function channel(id: number, kind: string, more: Partial<ChannelHeader> =
 }
 
 export function header(channels: readonly ChannelHeader[], end_ns = 1000, more: Partial<PageHeader> = {}): PageHeader {
-  return { format: 1, title: "run", verdict: "", standing: "", lead: "", why: "", start_ns: 0, end_ns, is_live: false, channels, world: null, hands: null, robots: [], sections: [], panels: [], left_out: [], footer: "", ...more };
+  return { format: 1, title: "run", verdict: "", standing: "", lead: "", why: "", start_ns: 0, end_ns, is_live: false, channels, world: null, hands: null, robot_hands: [], robots: [], sections: [], panels: [], left_out: [], footer: "", ...more };
 }
 
 export function store(channels: readonly ChannelHeader[], end_ns = 1000, source?: Source): Store {

@@ -62,7 +62,7 @@ class QueueMachine(RuleBasedStateMachine):
 
 
 TestQueue = QueueMachine.TestCase
-TestQueue.settings = settings(max_examples=40, stateful_step_count=30, deadline=None)
+TestQueue.settings = settings(max_examples=40, stateful_step_count=30)
 
 
 def test_who_waits_is_woken_by_what_comes_from_another_thread() -> None:

@@ -66,4 +66,4 @@ class HoldsMachine(RuleBasedStateMachine):
 
 
 TestHolds = HoldsMachine.TestCase
-TestHolds.settings = settings(max_examples=30, stateful_step_count=20, deadline=None)
+TestHolds.settings = settings(max_examples=30, stateful_step_count=20)

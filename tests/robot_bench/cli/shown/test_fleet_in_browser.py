@@ -37,3 +37,5 @@ def test_all_robots_are_seen_live_and_one_is_chosen(tmp_path: Path) -> None:
     assert 1_000_000 <= found["step"] < 1_100_000
     assert found["back"] == 0, "nothing is offered that robots of one world cannot do"
     assert found["shares"] > 20
+    assert found["hands"] == ["west: press stop-button"]
+    assert "press" in (tmp_path / "run" / "hands.toml").read_text(encoding="utf-8")

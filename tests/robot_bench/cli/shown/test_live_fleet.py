@@ -75,7 +75,7 @@ def test_robots_that_are_looked_at_halted_and_stepped_leave_the_same_traces(alon
     heads = [state.head_ns for state in script.states if not state.is_running]
     assert {round((after - before) / MS) for before, after in pairwise(heads)} == {0, 1}
     troubles = {state.trouble for state in script.states} - {""}
-    assert any("stepped by the millisecond alone" in one for one in troubles)
+    assert any("stepped by the millisecond, and changed by hand alone" in one for one in troubles)
     assert any("not set back" in one for one in troubles)
     assert (live.state.is_running, live.state.why) == (False, "the run is over")
     assert not live.source.recording.header.is_live
@@ -102,6 +102,43 @@ def test_every_robot_has_its_rows_and_its_panels(alone: Path, tmp_path: Path) ->
     assert live.look("program", "nobody") is None
     assert live.look("no such", "") is None
     assert live.offered("x") == ()
+
+
+def test_what_hands_do_to_one_of_them_is_written_down_and_is_that_run_without_a_page(tmp_path: Path) -> None:
+    live, script, folder = looked_at(
+        tmp_path, RunCommand(do="hand", words="place post cylinder 0.1 at 0 1.5", robot="east"),
+        RunCommand(do="hand", words="move post to 0.3 1.4", robot="west"),
+        RunCommand(do="hand", words="fault sonar-stuck 3 0.2", robot="west"),
+        RunCommand(do="hand", words="pin DD3 high", robot="east"),
+        RunCommand(do="drive", forward_mps=0.3, turn_dps=20, robot="east"), RunCommand(do="pause"),
+        RunCommand(do="hand", words="type usart1 go"), RunCommand(do="hand", words="remove nobody", robot="east"),
+        RunCommand(do="hand", words="dance"), RunCommand(do="hand", words="let go DD3", robot="nobody"),
+        RunCommand(do="run"), RunCommand(do="stop"), RunCommand(do="hand", words="let go wheels", robot="east"),
+        RunCommand(do="save", words="test"), RunCommand(do="save", words="novel"), speed=0.2,
+    )  # fmt: skip
+    kept = [(hand.robot, hand.words) for hand in live._hands.done]
+    assert kept == [
+        ("east", "place post cylinder 0.1 at 0 1.5"), ("west", "move post to 0.3 1.4"),
+        ("west", "fault sonar-stuck 3 0.2"), ("east", "pin DD3 high"), ("east", "drive 0.300 20.0"),
+        ("west", "type usart1 go"), ("east", "drive 0.000 0.0"), ("east", "let go wheels"),
+    ]  # fmt: skip
+    troubles = " ".join(dict.fromkeys(state.trouble for state in script.states))
+    for words in ("nobody", "nothing is done by 'dance'", "no robot with a program", "not saved as 'novel'"):
+        assert words in troubles
+    assert (live.state.hand_count, live.state.hands[0].words) == (8, "east: place post cylinder 0.1 at 0 1.5")
+    assert {state.saved for state in script.states} - {""} == {f"saved: pytest {tmp_path / 'test_run.py'}"}
+    written = load_scenario(str(folder / "hands.toml"))
+    assert hashes(run_together(written, tmp_path / "again", files=Files.SUMMARY).folder) == hashes(folder)
+    assert load_scenario(str(tmp_path / "run.toml")).programmed[1].hands == written.programmed[1].hands
+
+
+def test_who_is_driven_moves_and_stands_when_its_page_is_not_heard_of(alone: Path, tmp_path: Path) -> None:
+    live, _, folder = looked_at(tmp_path, *[RunCommand(do="drive", forward_mps=0.5, robot="west")] * 6, speed=0.2)
+    way = {name: [row.x for row in read_run(one / name).poses] for name in NAMES for one in (folder,)}
+    still = {name: [row.x for row in read_run(alone / name).poses] for name in NAMES}
+    assert way["west"][-1] > still["west"][-1] + 0.05
+    assert way["east"] == still["east"]
+    assert [hand.words for hand in live._hands.done] == ["drive 0.500 0.0", "drive 0.000 0.0"]
 
 
 def test_too_many_commands_are_refused() -> None:

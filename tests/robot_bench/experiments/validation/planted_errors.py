@@ -86,8 +86,8 @@ PLANTED: Sequence[Planted] = (
     # the adapter's model, Python
     Planted("ranges 2 % long", f"{_MODEL}distances.py", "self._readings[number] = (range_um, now)",
             "self._readings[number] = (range_um * 51 // 50, now)", "sensors-all", READINGS, MODEL),
-    Planted("position of 16 bits", f"{_MODEL}encoders.py", "POSITION_MODULUS = 1 << 15", "POSITION_MODULUS = 1 << 16",
-            "encoders", PACKETS, MODEL),
+    Planted("position of 16 bits", f"{_MODEL}encoders.py", "self._x = Unwrapper(POSITION_MODULUS)",
+            "self._x = Unwrapper(2 * POSITION_MODULUS)", "encoders", PACKETS, MODEL),
     Planted("heading lost on its wrap", f"{_MODEL}encoders.py", "self._heading += turn",
             "self._heading += turn if abs(turn) < 60 else 0", "sparse", PACKETS, MODEL),
     # the virtual robot

@@ -1,6 +1,6 @@
 // All that the page knows of a run: its header, and of each channel what was sent so far. Views read from here and say what they need.
 import { computed, type ReadonlySignal, signal, type Signal } from "@preact/signals";
-import type { ChannelHeader, PageHeader, PanelState, RunCommand, RunState, Wanted } from "../generated/view";
+import type { ChannelHeader, HandsOffer, PageHeader, PanelState, RunCommand, RunState, Wanted } from "../generated/view";
 import type { Frame } from "./frames";
 import { Lane, OPEN_END_NS, serves } from "./lane";
 
@@ -33,6 +33,8 @@ export type Command = Pick<RunCommand, "do"> & Partial<RunCommand>;
 const OF_ALL: ReadonlySet<string> = new Set(["pose", "ranges", "things"]);
 /** How long requests of one moment are gathered, ms. */
 const GATHERED_MS = 40;
+/** How long rows that come are gathered before they are shown, ms: less than two pictures of a screen. */
+const SHOWN_MS = 30;
 /** Pixels that a whole run is asked for. */
 const WHOLE_PIXELS = 2000;
 /** The most that the server takes. */
@@ -63,6 +65,7 @@ export class Store {
   private readonly open: Request[] = [];
   private gathered = new Map<string, { ids: Set<number>; from: number; to: number; pixels: number }>();
   private timer: ReturnType<typeof setTimeout> | undefined;
+  private showing: ReturnType<typeof setTimeout> | undefined;
 
   constructor(header: PageHeader, private readonly source: Source | undefined) {
     this.all = signal(header);
@@ -109,6 +112,12 @@ export class Store {
     return (OF_ALL.has(kind) ? this.header.value.channels : this.chosen).filter((channel) => channel.kind === kind);
   }
 
+  /** What hands can do here, to the robot that is chosen where there are several; null: nothing. */
+  get handsOffer(): HandsOffer | null {
+    const { hands, robot_hands } = this.header.value;
+    return robot_hands.find((one) => one.robot === this.robot.value) ?? hands;
+  }
+
   /** Names of robots of which one may be chosen: none where they are futures of one. */
   get robots(): readonly string[] {
     const names = this.shown.value ? [] : this.header.value.robots.map(({ name }) => name).filter(Boolean);
@@ -127,13 +136,22 @@ export class Store {
   /** Takes rows that were asked for, or stand in the page. */
   receive(frames: readonly Frame[]): void {
     for (const frame of frames) this.lane(frame.channel).add(frame);
-    this.version.value++;
+    this.showSoon();
   }
 
   /** Takes rows that a live run has just made. */
   extend(frame: Frame): void {
     this.lane(frame.channel).extend(frame);
-    this.version.value++;
+    this.showSoon();
+  }
+
+  /** Rows come a channel a message: those of one moment are shown at once, since each showing draws all views anew. */
+  private showSoon(): void {
+    if (this.version.peek() === 0) this.version.value++;
+    else this.showing ??= setTimeout(() => {
+      this.showing = undefined;
+      this.version.value++;
+    }, SHOWN_MS);
   }
 
   /** Rows of a channel that show a window best, or undefined while there are none; with `pixels`, finer ones are asked for where they are missing. */

@@ -236,6 +236,7 @@ export interface FaultOffer {
 
 /** What hands can do in what is shown, beside moving its things. */
 export interface HandsOffer {
+  readonly robot: string;
   readonly faults: readonly FaultOffer[];
   readonly buttons: readonly string[];
   readonly pins: readonly string[];
@@ -290,6 +291,7 @@ export interface PageHeader {
   readonly world: WorldHeader | null;
   readonly robots: readonly RobotHeader[];
   readonly hands: HandsOffer | null;
+  readonly robot_hands: readonly HandsOffer[];
   readonly sections: readonly PageSection[];
   readonly panels: readonly PanelHeader[];
   readonly left_out: readonly string[];
@@ -512,6 +514,7 @@ export interface RunCommand {
   readonly speed: number;
   readonly words: string;
   readonly future: string;
+  readonly robot: string;
   readonly number: number;
   readonly forward_mps: number;
   readonly turn_dps: number;

@@ -5,7 +5,7 @@ import type { Driving } from "./driving";
 import { STOP_KEYS } from "./keys";
 
 export function Drive({ app, driving }: { app: App; driving: Driving }) {
-  const offer = app.store.header.value.hands!, [ahead, left] = driving.way.value, share = driving.share.value, isOn = driving.isOn.value;
+  const offer = app.store.handsOffer!, [ahead, left] = driving.way.value, share = driving.share.value, isOn = driving.isOn.value;
   const box = useRef<HTMLDivElement>(null);
   useEffect(() => driving.begin(), [driving]);
   const push = (event: PointerEvent) => {

@@ -1,6 +1,7 @@
 // Drives the robot by keys, the stick on the page, or a pad. It stands unless something is held, here and now: what is held is forgotten when the
 // page loses focus, is hidden, left, or hears nothing of the program any more, and has to be pressed anew.
 import { effect, signal } from "@preact/signals";
+import type { Command } from "../data/store";
 import type { App } from "../shell/app";
 import { DRIVE_KEYS, FACTOR, FASTER, LEAST_SHARE, padWay, SLOWER, STOP_KEYS, type Way, wayOf } from "./keys";
 
@@ -21,6 +22,8 @@ export class Driving {
   private padIsFree = true;
   private timer: ReturnType<typeof setInterval> | undefined;
   private wasMoving = false;
+  /** Whose wheels these are, of several robots. */
+  private robot = "";
 
   constructor(private readonly app: App) {}
 
@@ -31,11 +34,13 @@ export class Driving {
     window.addEventListener("pagehide", stop);
     document.addEventListener("visibilitychange", hidden);
     const lost = effect(() => { if (this.app.store.trouble.value || this.app.stops.value) this.stop(); });
+    const other = effect(() => this.turnTo(this.app.store.handsOffer?.robot ?? ""));
     this.timer = setInterval(() => this.turn(), SAID_MS);
     return () => {
       this.stop();
       clearInterval(this.timer);
       lost();
+      other();
       window.removeEventListener("blur", stop);
       window.removeEventListener("pagehide", stop);
       document.removeEventListener("visibilitychange", hidden);
@@ -46,9 +51,20 @@ export class Driving {
   turnOn(isOn: boolean): void {
     const isReal = this.app.store.header.peek().hands?.is_real ?? false;
     this.forget();
+    this.wasMoving = false; // what is asked for here is the last of what was held
     this.isOn.value = isOn;
-    if (isOn || isReal) this.app.ask({ do: "drive", forward_mps: 0, turn_dps: 0 });
-    else this.app.ask({ do: "hand", words: "let go wheels" });
+    if (isOn || isReal) this.ask({ do: "drive", forward_mps: 0, turn_dps: 0 });
+    else this.ask({ do: "hand", words: "let go wheels" });
+  }
+
+  /** Takes another robot: the one before drives by itself again. */
+  private turnTo(robot: string): void {
+    if (robot !== this.robot && this.isOn.peek()) this.turnOn(false);
+    this.robot = robot;
+  }
+
+  private ask(command: Command): void {
+    this.app.ask({ ...command, ...(this.robot ? { robot: this.robot } : {}) });
   }
 
   /** Forgets what is held: the robot stands. */
@@ -96,10 +112,10 @@ export class Driving {
     if (!isPulled) this.padIsFree = true;
     const own = ahead || left ? [ahead, left] as const : this.stick, way = isPulled && this.padIsFree && document.hasFocus() ? pad : own;
     this.way.value = this.isOn.peek() ? way : STILL;
-    const isMoving = this.way.peek().some((one) => one !== 0), offer = this.app.store.header.peek().hands;
+    const isMoving = this.way.peek().some((one) => one !== 0), offer = this.app.store.handsOffer;
     if ((isMoving || this.wasMoving) && offer) {
       const [forward, turn] = this.way.peek(), share = this.share.peek();
-      this.app.ask({ do: "drive", forward_mps: forward * share * offer.most_mps, turn_dps: turn * share * offer.most_dps });
+      this.ask({ do: "drive", forward_mps: forward * share * offer.most_mps, turn_dps: turn * share * offer.most_dps });
     }
     this.wasMoving = isMoving;
   }

@@ -6,7 +6,7 @@ import { moment } from "../time/format";
 import { thingsAt } from "../views/plan/things";
 import { freeName, moved, placedBox, placedCylinder, ROBOT } from "./words";
 
-const hand = (app: App, words: string) => app.move({ do: "hand", words });
+const hand = (app: App, words: string) => app.byHand({ do: "hand", words });
 
 function Numbers({ label, value, step = 0.1, least, most, onValue }: { label: string; value: number; step?: number; least?: number; most?: number; onValue: (value: number) => void }) {
   return <label class="inline-label">{label} <input class="short-input" type="number" step={step} min={least} max={most} value={value} onChange={(event) => onValue(Number(event.currentTarget.value))} /></label>;
@@ -43,7 +43,7 @@ export function Things({ app }: { app: App }) {
 }
 
 export function Faults({ app }: { app: App }) {
-  const { faults, buttons } = app.store.header.value.hands!, [name, setName] = useState(faults[0]?.name ?? ""), [said, setSaid] = useState<Record<string, string>>({}), [button, setButton] = useState(buttons[0] ?? "");
+  const { faults, buttons } = app.store.handsOffer!, [name, setName] = useState(faults[0]?.name ?? ""), [said, setSaid] = useState<Record<string, string>>({}), [button, setButton] = useState(buttons[0] ?? "");
   const fault = faults.find((one) => one.name === name) ?? faults[0];
   const words = fault ? [fault.name, ...fault.words.map((word) => said[word.name] ?? word.usual)].join(" ") : "";
   if (!fault && !buttons.length) return null;
@@ -78,7 +78,7 @@ function Word({ word, value, onValue }: { word: WordOffer; value: string; onValu
 }
 
 export function Board({ app }: { app: App }) {
-  const { pins, analog_pins, ports } = app.store.header.value.hands!, [pin, setPin] = useState(pins[0] ?? ""), [analog, setAnalog] = useState(analog_pins[0] ?? "");
+  const { pins, analog_pins, ports } = app.store.handsOffer!, [pin, setPin] = useState(pins[0] ?? ""), [analog, setAnalog] = useState(analog_pins[0] ?? "");
   const [volts, setVolts] = useState(1.65), [port, setPort] = useState(ports[0] ?? ""), [text, setText] = useState("");
   return (
     <section class="hand-part" aria-label="Board">

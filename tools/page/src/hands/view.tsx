@@ -16,9 +16,12 @@ export const hands: ViewKind = {
 };
 
 function Hands({ app, driving }: { app: App; driving: Driving }) {
-  const offer = app.store.header.value.hands!;
+  const offer = app.store.handsOffer!, all = app.store.header.value.robot_hands;
   return (
-    <div class="hands" tabIndex={0} role="region" aria-label="What hands can do">
+    <div class="hands" tabIndex={0} role="region" aria-label="What hands can do" key={offer.robot}>
+      {all.length > 1 && <label class="inline-label">hands on <select aria-label="Robot that hands are on" value={offer.robot} onChange={(event) => { app.store.robot.value = event.currentTarget.value; }}>
+        {all.map(({ robot }) => <option value={robot}>{robot}</option>)}
+      </select></label>}
       {offer.most_mps > 0 && <Drive app={app} driving={driving} />}
       {offer.is_real ? <button type="button" class="stop" onClick={() => app.stop()}>STOP</button> : <>{app.store.header.value.world && <Things app={app} />}<Faults app={app} /><Board app={app} /><Done app={app} /></>}
     </div>

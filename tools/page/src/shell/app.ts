@@ -92,6 +92,11 @@ export class App {
     this.ask({ ...command, ...(takesTime ? { at_ns: at } : {}) });
   }
 
+  /** Asks for something that is done by hand; to a robot of several, the chosen one where none is named. */
+  byHand(command: Command, robot = this.store.handsOffer?.robot ?? ""): void {
+    this.move({ ...command, ...(robot ? { robot } : {}) });
+  }
+
   private follow(): void {
     const run = this.store.run.value, beside = this.beside.value, { start_ns } = this.store.all.value;
     if (!run || this.store.all.value.hands?.is_real) return; // a robot that is there stands nowhere in time

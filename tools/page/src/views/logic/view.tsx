@@ -86,7 +86,7 @@ class LogicView {
       return;
     }
     const t = await find(app.store, wire.id, app.clock.now.peek(), way, sought);
-    if (t === undefined) this.said.value = way === 1 ? "none after this time" : "none before this time";
+    if (t === undefined) this.said.value = `${wire.name}: none ${way === 1 ? "after" : "before"} this time`;
     else {
       this.said.value = "";
       app.clock.lookAt(t, sought.what === "shorter" ? sought.ns : 1000);
@@ -315,6 +315,11 @@ function wireOptions(store: Store) {
   return rowsOf(store).filter((row) => row.channel);
 }
 
+/** A wire out of its group is told from its like, the s1 of another motor, by what the bench calls it. */
+function fullName({ kind, title, channel }: Row): string {
+  return kind === "wire" && channel?.doc && !title.includes(channel.doc) ? `${title} (${channel.doc})` : title;
+}
+
 function Bar({ view }: { view: LogicView }) {
   const { app } = view, needsInput = view.what.value === "value" || view.what.value === "shorter" || view.what.value === "text";
   const hint = { value: "1 or 0x1F", shorter: "2 us", text: "text" }[view.what.value as "value" | "shorter" | "text"];
@@ -324,7 +329,7 @@ function Bar({ view }: { view: LogicView }) {
       <IconButton icon="further" label="Further away in time" onClick={() => app.clock.zoom(2)} />
       <IconButton icon="whole" label="Show the whole run" onClick={() => app.clock.showAll()} />
       <select aria-label="Wire to look along" value={view.wire()?.id ?? ""} onChange={(event) => { app.wire.value = Number(event.currentTarget.value); }}>
-        {wireOptions(app.store).map((row) => <option value={row.channel!.id}>{[row.channel!.source, row.title].filter(Boolean).join(" ")}</option>)}
+        {wireOptions(app.store).map((row) => <option value={row.channel!.id}>{[row.channel!.source, fullName(row)].filter(Boolean).join(" ")}</option>)}
       </select>
       <select aria-label="What to look for" value={view.what.value} onChange={(event) => { view.what.value = event.currentTarget.value as What; }}>
         {WHATS.map(([what, words]) => <option value={what}>{words}</option>)}

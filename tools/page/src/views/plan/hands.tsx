@@ -19,6 +19,8 @@ const TURN = Math.PI / 12;
 
 interface Dragged {
   readonly name: string;
+  /** Of several robots the one that is dragged. */
+  readonly robot?: string | undefined;
   /** Its outline around its middle; undefined: it is round. */
   readonly points: readonly (readonly [number, number])[];
   readonly radius: number;
@@ -50,8 +52,9 @@ export class PlanHands {
       return true;
     }
     const now = clock.now.peek(), thing = thingsAt(store, now).findLast((one) => one.kind !== "robot" && covers(one, x, y));
-    const robot = tracksAt(store, now)[0], isRobot = robot !== undefined && isUnder(robot, x, y);
-    if (isRobot) this.dragged = { name: ROBOT, points: hull(robot), radius: 0, dx: robot.at.x - x, dy: robot.at.y - y, put: { x: robot.at.x, y: robot.at.y, heading: robot.at.heading } };
+    const all = tracksAt(store, now), offers = store.header.peek().robot_hands;
+    const robot = offers.length ? all.find((one) => isUnder(one, x, y) && offers.some((offer) => offer.robot === one.robot.name)) : all[0];
+    if (robot && isUnder(robot, x, y)) this.dragged = { name: ROBOT, robot: offers.length ? robot.robot.name : undefined, points: hull(robot), radius: 0, dx: robot.at.x - x, dy: robot.at.y - y, put: { x: robot.at.x, y: robot.at.y, heading: robot.at.heading } };
     else if (thing) this.dragged = { name: thing.name, points: corners(thing), radius: thing.radius_m, dx: thing.x_m - x, dy: thing.y_m - y, put: { x: thing.x_m, y: thing.y_m, heading: thing.heading_rad } };
     return this.dragged !== undefined;
   }
@@ -74,11 +77,11 @@ export class PlanHands {
   release(): void {
     const { dragged } = this, drawn = this.drawn && this.shape();
     this.dragged = this.drawn = undefined;
-    if (dragged) this.app.move({ do: "hand", words: moved(dragged.name, dragged.put) });
+    if (dragged) this.app.byHand({ do: "hand", words: moved(dragged.name, dragged.put) }, dragged.robot);
     if (!drawn || drawn.length < LEAST_M) return;
     const mode = this.mode.peek(), { store, clock } = this.app, world = store.header.peek().world?.things ?? [];
     const name = freeName(mode, [...world, ...thingsAt(store, clock.now.peek())].map((thing) => thing.name));
-    this.app.move({ do: "hand", words: placedBox(name, drawn.length, drawn.width, drawn.put) });
+    this.app.byHand({ do: "hand", words: placedBox(name, drawn.length, drawn.width, drawn.put) });
   }
 
   cancel(): void {
