@@ -5,6 +5,8 @@ import os
 import re
 import shutil
 import subprocess
+from configparser import ConfigParser
+from importlib.metadata import entry_points
 from importlib.resources import files
 from pathlib import Path
 
@@ -322,6 +324,20 @@ def test_each_file_names_the_program_that_the_build_makes_and_all_of_its_sources
     assert not [name for name, text in contents.items() if re.search(r"@[A-Z]+@", text)]
     held_back = {"make": "cmake", "cmake": "make test", "platformio": "make"}[build]
     assert held_back not in contents["README.md"]
+
+
+def test_the_tests_find_the_plug_in_whichever_distribution_brought_it() -> None:
+    written = ConfigParser()
+    written.read_string(project.project_files("kinematic")["pytest.ini"])
+    settings = dict(written["pytest"])
+    named = re.findall(r"-p (\S+)", settings["addopts"])
+    assert named
+    assert {
+        point.name for point in entry_points(group="pytest11") if point.module == "robot_bench.cli.pytest_plugin"
+    } == set(named)
+    assert (
+        "required_plugins" not in settings
+    )  # pytest reads names of distributions there: p2os, or robot-bench from wheels
 
 
 def test_the_debuggers_file_is_json_with_comments() -> None:
