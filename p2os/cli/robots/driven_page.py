@@ -13,8 +13,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Protocol
 
-from p2os.cli.robots.command_queue import CommandQueue
 from p2os.cli.robots.drive_deadman import DriveDeadman
+from p2os.cli.robots.page_control import QueuedControl
 from p2os.client import Link
 from p2os.client.notices import DeadmanStopped, GapStopped, LinkLost, LinkLostError, MotorsDisabled, Notice
 from p2os.transport.wall_clock import Clock, GapWatch, wall_clock
@@ -43,7 +43,7 @@ class PageDrivenClient(Protocol):
         """Call `callback` with what happens, from any thread."""
 
 
-class PageDriver:
+class PageDriver(QueuedControl):
     """Drives a robot as its pages say; the page's `RunControl`.
 
     Args:
@@ -53,31 +53,10 @@ class PageDriver:
     """
 
     def __init__(self, most_mps: float, most_dps: float, clock: Clock = wall_clock) -> None:
+        super().__init__(RunState(is_running=True, why="the robot stands"))
         self._deadman, self._clock = DriveDeadman(most_mps, most_dps), clock
-        self._commands = CommandQueue()
-        self._state = RunState(is_running=True, why="the robot stands")
         self._notices: queue.SimpleQueue[Notice] = queue.SimpleQueue()
         self._gaps = GapWatch(clock())
-
-    # As the page's `RunControl`; from any thread.
-
-    @property
-    def state(self) -> RunState:
-        """How the robot stands."""
-        return self._state
-
-    def offer(self, command: RunCommand) -> bool:
-        """Take a command; False where too many wait, but for those that stop."""
-        return self._commands.offer(command)
-
-    def offered(self, _begun: str) -> tuple[str, ...]:
-        """Return names of variables: nobody sees into the program of a robot that is there."""
-        return ()
-
-    def look(self, _panel: str, _choice: str) -> None:
-        """Return what a panel shows: nothing, since nobody sees into it."""
-
-    # As the loop.
 
     def drive(self, client: PageDrivenClient) -> None:
         """Drive until an interrupt is raised here."""
@@ -134,9 +113,7 @@ class PageDriver:
             why = STOPPED if self._deadman.is_stopped else "the robot stands"
         if command is None and not trouble:
             trouble = old.trouble
-        state = replace(old, why=why, trouble=trouble, done=done)
-        if state != old:
-            self._state = state
+        self._show(replace(old, why=why, trouble=trouble, done=done))
 
 
 def _has_stopped(notice: Notice) -> bool:

@@ -6,6 +6,7 @@ Invariant: whoever drives hears of each STOP at its next turn, and once.
 import threading
 from dataclasses import replace
 
+from p2os.cli.robots.page_control import ShownControl
 from p2os.view.header import HandsOffer
 from p2os.view.run_control import RunCommand, RunState
 
@@ -15,20 +16,15 @@ STANDS = "stopped from the page: let go of what is held, and press anew"
 DRIVEN_HERE = "the terminal drives this robot: its page stops it, and nothing else"
 
 
-class PageStop:
+class PageStop(ShownControl):
     """The button; the page's `RunControl`."""
 
     def __init__(self) -> None:
+        super().__init__(RunState(is_running=True, why="the terminal drives"))
         self._pressed = threading.Event()
         self._guard = threading.Lock()
-        self._state = RunState(is_running=True, why="the terminal drives")
 
     # As the page's `RunControl`; from any thread.
-
-    @property
-    def state(self) -> RunState:
-        """How the robot stands, as far as its page is concerned."""
-        return self._state
 
     def offer(self, command: RunCommand) -> bool:
         """Take a command: STOP, or one that is refused in the state."""
@@ -36,13 +32,6 @@ class PageStop:
             self._pressed.set()
         self._say(trouble="" if command.do == "stop" else DRIVEN_HERE, is_done=True)
         return True
-
-    def offered(self, _begun: str) -> tuple[str, ...]:
-        """Return names of variables: nobody sees into the program of a robot that is there."""
-        return ()
-
-    def look(self, _panel: str, _choice: str) -> None:
-        """Return what a panel shows: nothing, since nobody sees into it."""
 
     # As who drives.
 
@@ -62,9 +51,7 @@ class PageStop:
     def _say(self, *, why: str | None = None, trouble: str | None = None, is_done: bool = False) -> None:
         with self._guard:
             old = self._state
-            state = replace(
+            self._show(replace(
                 old, why=old.why if why is None else why, trouble=old.trouble if trouble is None else trouble,
                 done=old.done + is_done,
-            )  # fmt: skip
-            if state != old:
-                self._state = state
+            ))  # fmt: skip

@@ -15,7 +15,6 @@ from typing import Protocol
 
 from bluepill_sim.core import Watchpoint
 from bluepill_sim.debug.machine import HaltReason, StopKind
-from bluepill_sim.errors import BluePillError
 from bluepill_sim.program.variables import Variable, read_variables
 from p2os.view.run_control import (
     Doing,
@@ -60,6 +59,11 @@ _SLOW = 0.25
 _MOST_LAG_NS: Nanos = NS_PER_S // 2
 #: chosen: a run that goes on is reported so often, ns of the clock.
 _REPORTED_NS: Nanos = 50 * NS_PER_MS
+
+
+def trouble_of(error: P2osError) -> str:
+    """Return what a page says of what could not be done."""
+    return f"{error} ({error.hint})" if error.hint else str(error)
 
 
 class FutureRecorder(Protocol):
@@ -185,9 +189,8 @@ class RunSession:
             if self.holds.is_shown_to_gdb and self._moves(command):
                 raise UsageError(GDB_STANDS)
             self._doing[command.do](command)
-        except (P2osError, BluePillError) as error:
-            hint = getattr(error, "hint", None)
-            self._trouble = f"{error} ({hint})" if hint else str(error)
+        except P2osError as error:
+            self._trouble = trouble_of(error)
             if command.do not in _BESIDE and not self.holds.is_shown_to_gdb:
                 self._stop("")
         if was_going and not self._is_going:

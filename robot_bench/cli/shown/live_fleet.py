@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from p2os.cli.robots.command_queue import CommandQueue
+from p2os.cli.robots.page_control import QueuedControl
 from p2os.transport.wall_clock import Clock, wall_clock
 from p2os.view.header import PageHeader, PageSection, PanelHeader, PanelState
 from p2os.view.live import LiveRecording
@@ -19,7 +19,7 @@ from p2os.view.run_control import HandState, RunCommand, RunState
 from p2os.view.targets import ViewPanel, panels_of
 from robot_bench.bench import Bench, run_of
 from robot_bench.cli.debugging.hands import saved_as
-from robot_bench.cli.debugging.session import MOST_HANDS
+from robot_bench.cli.debugging.session import MOST_HANDS, trouble_of
 from robot_bench.cli.shown.fleet_hands import FleetHands
 from robot_bench.cli.shown.looked_panels import LookedPanels
 from robot_bench.cli.shown.offered_hands import hands_of
@@ -59,7 +59,7 @@ class RobotReleased:
     events: Sequence[Recorded]
 
 
-class LiveFleet:
+class LiveFleet(QueuedControl):
     """Hands over what happens on the benches of robots in one world, and goes on as pages ask for.
 
     Args:
@@ -73,6 +73,7 @@ class LiveFleet:
         self, scenario: Scenario, *, speed: float = 1.0, on_wait: Callable[[], None] = lambda: None,
         clock: Clock = wall_clock,
     ) -> None:  # fmt: skip
+        super().__init__(RunState(is_running=True, speed=speed))
         offers = [replace(hands_of(one), robot=one.name) for one in scenario.programmed]
         self._scenario = scenario
         self._run_folder: Path | None = None
@@ -81,8 +82,6 @@ class LiveFleet:
         self._blocks: dict[str, Blocks] = {}
         self._on_wait, self._clock = on_wait, clock
         self._end_ns = scenario.duration_ns
-        self._commands = CommandQueue()
-        self._state = RunState(is_running=True, speed=speed)
         self._panels = LookedPanels(())
         self._hands = FleetHands({}, 0)
         #: Until when it runs though it stands still: a step; and the clock and the time at which its pace began.
@@ -96,20 +95,7 @@ class LiveFleet:
         self.source: LiveRecording[FleetBuilt | RobotReleased] = LiveRecording(self._recording, self._add)
         self.source.control = self
 
-    # As the page's `RunControl`.
-
-    @property
-    def state(self) -> RunState:
-        """How the run stands."""
-        return self._state
-
-    def offer(self, command: RunCommand) -> bool:
-        """Take a command; False where too many wait."""
-        return self._commands.offer(command)
-
-    def offered(self, begun: str) -> Sequence[str]:  # noqa: ARG002 - as of `RunControl`
-        """Variables are looked at of a robot alone."""
-        return ()
+    # As the page's `RunControl`; variables are looked at of a robot alone.
 
     def look(self, panel: str, choice: str) -> PanelState | None:
         """Return what a panel showed last; while it is asked for, it is looked at ten times a second."""
@@ -222,7 +208,7 @@ class LiveFleet:
         try:
             act()
         except P2osError as error:
-            return replace(state, trouble=f"{error} ({error.hint})" if error.hint else str(error))
+            return replace(state, trouble=trouble_of(error))
         done = self._hands.done
         if done is before:
             return state
@@ -237,11 +223,7 @@ class LiveFleet:
             saved = saved_beside(self._scenario, self._hands.done, self._run_folder, kind)
             return replace(state, saved=saved)
         except P2osError as error:
-            return replace(state, trouble=f"{error} ({error.hint})" if error.hint else str(error))
-
-    def _show(self, state: RunState) -> None:
-        if state != self._state:
-            self._state = state
+            return replace(state, trouble=trouble_of(error))
 
     def _add(self, happened: FleetBuilt | RobotReleased) -> None:
         if isinstance(happened, FleetBuilt):

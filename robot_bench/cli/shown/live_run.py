@@ -18,8 +18,8 @@ from bluepill_sim.cli.gdb_server import GdbPort
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.program.image import load_image
 from bluepill_sim.program.variables import VariableTable, read_variables
-from p2os.cli.robots.command_queue import CommandQueue
 from p2os.cli.robots.drive_deadman import DriveDeadman
+from p2os.cli.robots.page_control import QueuedControl
 from p2os.transport.wall_clock import Clock, wall_clock
 from p2os.view.header import PageHeader, PanelHeader, PanelState
 from p2os.view.live import LiveRecording
@@ -98,7 +98,7 @@ class VariablesSeen:
 Happened = BenchBuilt | BenchReleased | FutureForked | FutureDropped | VariablesSeen
 
 
-class LiveRun:
+class LiveRun(QueuedControl):
     """Hands over what happens on a bench, and does there what pages ask for.
 
     Args:
@@ -120,6 +120,7 @@ class LiveRun:
         clock: Clock = wall_clock,
         gdb: GdbPort | None = None,
     ) -> None:
+        super().__init__(RunState(is_running=True, speed=speed))
         self._gdb_port = gdb
         self._gdb: GdbBeside | None = None
         self._scenario = scenario
@@ -133,9 +134,6 @@ class LiveRun:
         self._panels = LookedPanels(())
         #: Whose chip the panels show.
         self._shown_bench: Bench | None = None
-        self._commands = CommandQueue()
-        #: How the run stands; None before it has begun.
-        self._state = RunState(is_running=True, speed=speed)
         self._session: RunSession | None = None
         self._folder: TemporaryDirectory[str] | None = None
         #: The run's own, and what is written there.
@@ -149,15 +147,6 @@ class LiveRun:
         self.source.control = self
 
     # As the page's `RunControl`.
-
-    @property
-    def state(self) -> RunState:
-        """How the run stands."""
-        return self._state
-
-    def offer(self, command: RunCommand) -> bool:
-        """Take a command; False where too many wait, but for those that stop."""
-        return self._commands.offer(command)
 
     def offered(self, begun: str) -> Sequence[str]:
         """Return names of variables that what was typed may become."""
@@ -265,10 +254,6 @@ class LiveRun:
         for future, types in session.watched():
             if stretches := future.take_seen():
                 self.source.offer(VariablesSeen(future.name, stretches, types), future.known_ns)
-
-    def _show(self, state: RunState) -> None:
-        if state is not self._state:
-            self._state = state
 
     # As the session's `FutureRecorder`.
 
