@@ -35,23 +35,13 @@ def stage(folder: Path) -> list[str]:
     shutil.rmtree(folder, ignore_errors=True)
     places = pages()
     files: dict[Path, Path] = {}
-    for source, place in places.items():
-        target = folder / "docs" / place
-        target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_text(as_staged(source, places, files), encoding="utf-8")
+    texts = {place: as_staged(source, places, files) for source, place in places.items()}
     made, wrong = generated()
-    for place, text in made.items():
-        target = folder / "docs" / place
-        target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_text(text, encoding="utf-8")
+    for place, text in (texts | made).items():
+        _target(folder, place).write_text(text, encoding="utf-8")
+    files |= {path: path.relative_to(ROOT / "docs") for path in (ROOT / "docs" / "pictures").rglob("*.*")}
     for path, place in files.items():
-        target = folder / "docs" / place
-        target.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy(path, target)
-    for path in (ROOT / "docs" / "pictures").rglob("*.*"):
-        target = folder / "docs" / path.relative_to(ROOT / "docs")
-        target.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy(path, target)
+        shutil.copy(path, _target(folder, place))
     shutil.copytree(OWN / "assets", folder / "docs" / "assets")
     config = (OWN / "zensical.toml").read_text(encoding="utf-8")
     listed = "".join(f'      {{ "{name}" = "{api.FOLDER}/{name}.md" }},\n' for name in api.MODULES)
@@ -59,6 +49,13 @@ def stage(folder: Path) -> list[str]:
     (folder / "zensical.toml").write_text(config, encoding="utf-8")
     wrong += [f"{place}: not in the navigation" for place in sorted({*places.values(), *made} - named(config))]
     return wrong
+
+
+def _target(folder: Path, place: Path) -> Path:
+    """Return where something of the site is staged, in a folder that is there."""
+    target = folder / "docs" / place
+    target.parent.mkdir(parents=True, exist_ok=True)
+    return target
 
 
 def named(config: str) -> set[Path]:
@@ -72,7 +69,7 @@ def pages() -> dict[Path, Path]:
     return found | {ROOT / name: Path(place) for name, place in TOP.items()}
 
 
-def generated() -> tuple[Mapping[Path, str], list[str]]:
+def generated() -> tuple[dict[Path, str], list[str]]:
     """Return the pages that are made of the code, and what is wrong with them."""
     documented, wrong = api.pages()
     made: dict[str, str] = {
