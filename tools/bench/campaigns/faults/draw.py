@@ -41,6 +41,10 @@ EQUIVALENT: Mapping[str, str] = {
     "startup.c:35:MVI:": "there is no initialised data, so nothing is read from there",
     "rover_board.c:95:MVAV:;": "each tick starts a conversion too, and none is read in the first 100",
     "odometer.c:18:MIA:": "it changes `moved` alone, which dodge never reads",
+    **dict.fromkeys(
+        ("motors_bits.c:13:MIFS:;", "motors_bits.c:14:MVAV:;"), "dodge asks for -2 to 3, and never for less than -4"
+    ),
+    "motors_bits.c:29:MFC:;": "the outputs' register is 0 after a reset already (RM0008, 9.2.4)",
 }
 
 
