@@ -8,6 +8,7 @@ Invariant: levels that follow each other within a millisecond are one change, si
 """
 
 import math
+import re
 from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal
 
@@ -15,8 +16,8 @@ from adapter_sim.codec import motor_value
 from adapter_sim.pinout import load_pinout
 from p2os.toml_record import Record
 from p2os.toml_schema import LONGEST_S, Key
-from robot_bench.events.kinds import MICRO, Event, PinEdge, Pose
-from robot_bench.events.selection import wire_named
+from robot_bench.events.kinds import MICRO, Event, PinEdge, Pose, Text
+from robot_bench.events.selection import Lines, wire_named
 from robot_bench.scenario.goals.signals import SKEW_NS
 from robot_bench.scenario.goals.watch import GoalKind, GoalOutcome, InTime, Watch, seconds
 from simbase.errors import UsageError, nearest, shown
@@ -388,6 +389,68 @@ class Lasts(MotorWatch):
         self._failure = f"{says}, {bound / NS_PER_S:g} s at {word}"
 
 
+class ReportsMotionTable(Record):
+    """A motion, and what is printed as it begins."""
+
+    motion: Annotated[str, Key(choices=MOTIONS, doc="what begins")]
+    before: _Before = ()
+    matches: Annotated[str, Key(doc="a regular expression that is found in a line")]
+    within_s: Annotated[float, Key(above=0, most=LONGEST_S, doc="the line comes so long before or after, at most")]
+
+    def __post_init__(self) -> None:
+        _refuse_other_motions(self.before)
+        try:
+            re.compile(self.matches)
+        except re.error as error:
+            raise UsageError(f"{self.matches!r} is no regular expression: {error}") from error
+
+
+class ReportsMotion(MotorWatch):
+    """As a motion begins a line is printed that says so, one for each time."""
+
+    STATE = ("_motion", "_lines", "_printed", "_due")
+    kinds = (PinEdge, Text)
+
+    def __init__(self, table: ReportsMotionTable) -> None:
+        super().__init__()
+        self._table, self._within = table, nanos(table.within_s)
+        self._found = re.compile(table.matches).search
+        self._motion: str = "stand"
+        self._lines = Lines()
+        #: When lines came that no motion has been found for, and when motions began without a line.
+        self._printed: list[Nanos] = []
+        self._due: list[Nanos] = []
+
+    def feed(self, event: Event) -> GoalOutcome | None:
+        if not isinstance(event, Text):
+            return super().feed(event)
+        outcome = self.advance_to(event.t)
+        line = self._lines.take(event)
+        if line is not None and event.data.endswith(b"\n") and self._found(line):
+            if self._due:
+                del self._due[0]
+            else:
+                self._printed.append(event.t)
+        return outcome
+
+    def stayed(self, since: Nanos, until: Nanos) -> None:
+        table, before, self._motion = self._table, self._motion, self.motion
+        if self._motion != before and self._motion == table.motion and (not table.before or before in table.before):
+            self._printed = [at for at in self._printed if since - at <= self._within]
+            if self._printed:
+                del self._printed[0]
+            else:
+                self._due.append(since)
+
+    def advance_to(self, limit: Nanos) -> GoalOutcome | None:
+        outcome = super().advance_to(limit)
+        if not self._due or limit - self._due[0] <= self._within or self._failure:
+            return outcome
+        self._failure = f"{self._table.motion} began at {seconds(self._due[0])}, and no line with "
+        self._failure += f"{self._table.matches!r} came within {self._within / NS_PER_S:g} s"
+        return self.finish(limit)
+
+
 def _refuse_other_motions(motions: tuple[str, ...]) -> None:
     for one in motions:
         if one not in MOTIONS:
@@ -445,5 +508,12 @@ KINDS: Mapping[str, GoalKind] = {
         LastsTable, lambda table: f"has motion {table.motion}{_after(table.before)} last {_lasting(table)}",
         Lasts, doc="each time, the motors ask for a motion no shorter and no longer", any_of=("least_s", "most_s"),
         holds_anywhere=True,
+    ),
+    "reports_motion": GoalKind(
+        ReportsMotionTable,
+        lambda table: f"prints {table.matches!r} within {table.within_s:g} s of motion {table.motion}"
+        f"{_after(table.before)}",
+        ReportsMotion, doc="each time that the motors begin a motion a line comes that matches, so long before "
+        "or after it at most", holds_anywhere=True,
     ),
 }  # fmt: skip

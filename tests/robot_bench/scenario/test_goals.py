@@ -167,6 +167,7 @@ HOLDS_SO_FAR: dict[str, dict[str, object]] = {
     "moves_on": {"way_m": 1, "within_s": 9}, "turns_away": {"near_m": 0.5, "free_m": 0.8},
     "steers_away": {"near_m": 0.5, "free_m": 0.8, "within_s": 1}, "no_idle_turn": {"free_m": 0.8, "within_s": 1},
     "turns_long": {"row": 3, "way_m": 0.3, "least_deg": 120}, "turn_ends": {"low": ["DD4"], "within_s": 1},
+    "reports_motion": {"motion": "turn", "matches": "turn", "within_s": 1},
     "backs_on_path": {"off_m": 0.1}, "smooth": {"most_mps2": 1}, "energy": {"most_j": 5},
     "hold_heading": {"heading_deg": 0, "tolerance_deg": 1}, "hold_speed": {"speed_mps": 0, "tolerance_mps": 0.1},
     "always": {"signal": "x_m", "most": 1}, "happens": {"event": "contact", "least": 0, "most": 1},

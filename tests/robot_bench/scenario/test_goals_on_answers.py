@@ -193,6 +193,32 @@ def test_goal_turn_ends_does_not_judge_what_comes_out_of_a_passage(t: int, met: 
     assert not turn_ends(gap, out, turning(8 * S, 3 * S), **table).met  # the next one comes out of none
 
 
+def says(t: int, *pieces: str) -> list[Text]:
+    return [Text(t=t, data=piece.encode()) for piece in pieces]
+
+
+@pytest.mark.parametrize(("t", "met"), [
+    (-100 * MS - 1, False), (-100 * MS, True), (0, True), (100 * MS, True), (100 * MS + 1, False)
+])  # fmt: skip
+def test_goal_reports_motion_wants_a_line_so_long_before_or_after(t: int, met: bool) -> None:
+    drives, turns, line = motors(0, 2, 2), motors(S, 2, -2, skew=0), says(S + t, "car: tu", "rn\n")
+    run = [*drives, *(line if t < 0 else turns), *(turns if t < 0 else line), at(9 * S)]
+    found = outcome("reports_motion", run, motion="turn", matches="turn$", within_s=0.1)
+    assert found.met is met
+    assert met or found.says == "turn began at 1.000 s, and no line with 'turn$' came within 0.1 s"
+    assert not outcome("reports_motion", run, motion="turn", matches="back", within_s=0.1).met
+    assert outcome("reports_motion", run, motion="turn", before=["back"], matches="back", within_s=0.1).met
+
+
+def test_goal_reports_motion_wants_a_line_each_time() -> None:
+    twice = flat(motors(S, 2, -2), motors(S + 10 * MS, 2, 2), motors(S + 20 * MS, 2, -2))
+    table = {"motion": "turn", "matches": "turn", "within_s": 0.1}
+    assert not outcome("reports_motion", flat(twice, says(S + 30 * MS, "turn\n"), at(9 * S)), **table).met
+    assert outcome("reports_motion", flat(twice, says(S + 30 * MS, "turn\n", "turn\n"), at(9 * S)), **table).met
+    assert not outcome("reports_motion", flat(says(S - 1, "turn\n"), twice, at(9 * S)), **table).met
+    assert not outcome("reports_motion", flat(twice, says(S + 30 * MS, "turn", " turn"), at(9 * S)), **table).met
+
+
 def prints(value: str, **table: Any) -> GoalOutcome:
     run = [at(0, left=0.1), at(S, left=0.3), at(2 * S, left=0.2), Text(t=2 * S, data=f"left {value} mm/s\n".encode())]
     return outcome("prints_numbers", run, **{"matches": r"left (-?\d+)", "times": 0.001, **table})
@@ -242,6 +268,7 @@ def test_goal_prints_lines_that_are_known_alone(pieces: list[str], says: str) ->
         ({"kind": "has_reason", "motion": "turn", "needs": ["PB0"], "within_s": 1}, "no list of lists"),
         ({"kind": "turn_ends", "low": [], "within_s": 1}, "low is empty"),
         ({"kind": "turn_ends", "low": ["DD3"], "within_s": 1, "passage": ["DD6"]}, "'DD6' of passage is no pin of low"),
+        ({"kind": "reports_motion", "motion": "turn", "matches": "(", "within_s": 1}, "is no regular expression"),
         ({"kind": "lasts", "motion": "turn"}, "needs least_s or most_s"),
         ({"kind": "prints_numbers", "matches": "left", "most": 1}, "has not one group"),
         ({"kind": "prints_numbers", "matches": "(", "most": 1}, "matches"),
