@@ -291,7 +291,7 @@ class TurnEnds(MotorWatch):
         self._motion: str = "stand"
         self._is_judged = False
         self._place: Pose | None = None
-        #: Forward since the last turn; far enough where there was none.
+        #: Since the last turn; far enough where there was none.
         self._way_um: float = math.inf
         #: How many were begun in this place.
         self._turns = 0
@@ -307,7 +307,7 @@ class TurnEnds(MotorWatch):
         if not isinstance(event, Pose):
             return super().feed(event)
         outcome = self.advance_to(event.t)
-        if self._place is not None and self._motion == "forward":
+        if self._place is not None:
             self._way_um += math.hypot(event.x - self._place.x, event.y - self._place.y)
         self._place = event
         return outcome

@@ -136,6 +136,8 @@ def test_goal_answers_counts_a_pin_for_so_long_after_it_has_fallen(t: int, met: 
     again = flat(run[:-6], pin(2 * S + 100 * MS, "DD4"), pin(2 * S + 150 * MS, "DD4", False), run[-6:])
     assert answers(again, any_high=["DD4"], within_s=0.0005, lingers_s=0.2).met is False
     assert answers(run, low=["DD4"], within_s=0.0005, lingers_s=0.2).met is False  # it is low in the end
+    back = flat(run[:-6], pin(2 * S + 100 * MS, "DD4"), motors(2 * S + 500 * MS, 3, 3, skew=0))
+    assert answers(back, any_high=["DD4"], within_s=0.0005, lingers_s=0.2).met is False
 
 
 @pytest.mark.parametrize(("before", "met"), [(1, True), (0, False)])
