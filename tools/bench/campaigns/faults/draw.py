@@ -39,6 +39,7 @@ EQUIVALENT: Mapping[str, str] = {
         "these pins are floating inputs after a reset already (RM0008, 9.2.1)",
     ),
     "startup.c:35:MVI:": "there is no initialised data, so nothing is read from there",
+    "startup.c:36:WLEC:>": "there is no initialised data, so nothing is copied either way",
     "rover_board.c:95:MVAV:;": "each tick starts a conversion too, and none is read in the first 100",
     **dict.fromkeys(
         ("odometer.c:18:MIA:", "odometer.c:18:MIFS:;"), "it changes `moved` alone, which dodge never reads"
