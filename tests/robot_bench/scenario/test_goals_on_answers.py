@@ -128,6 +128,99 @@ def test_goal_lasts_is_missed_while_it_goes_on_and_from_the_beginning() -> None:
     assert outcome("lasts", flat(motors(0, 0, 0)), motion="stand", least_s=20).met  # it is not over
 
 
+@pytest.mark.parametrize(("t", "met"), [(199 * MS, False), (200 * MS, True), (201 * MS, True)])
+def test_goal_answers_counts_a_pin_for_so_long_after_it_has_fallen(t: int, met: bool) -> None:
+    run = flat(motors(0, 0, 0), pin(S, "DD4"), pin(2 * S, "DD4", False), motors(2 * S + t, 3, 3, skew=0))
+    assert answers(run, any_high=["DD4"], within_s=0.0005).met
+    assert answers(run, any_high=["DD4"], within_s=0.0005, lingers_s=0.2).met is met
+    again = flat(run[:-6], pin(2 * S + 100 * MS, "DD4"), pin(2 * S + 150 * MS, "DD4", False), run[-6:])
+    assert answers(again, any_high=["DD4"], within_s=0.0005, lingers_s=0.2).met is False
+    assert answers(run, low=["DD4"], within_s=0.0005, lingers_s=0.2).met is False  # it is low in the end
+    back = flat(run[:-6], pin(2 * S + 100 * MS, "DD4"), motors(2 * S + 500 * MS, 3, 3, skew=0))
+    assert answers(back, any_high=["DD4"], within_s=0.0005, lingers_s=0.2).met is False
+
+
+@pytest.mark.parametrize(("before", "met"), [(1, True), (0, False)])
+def test_goal_answers_sees_a_pin_fall_where_nothing_else_happens(before: int, met: bool) -> None:
+    run = flat(motors(0, 3, 3), pin(S, "DD4"), pin(2 * S, "DD4", False))
+    table = {"low": ["DD4"], "lingers_s": 0.2, "within_s": 1.5}
+    assert answers(run, 2 * S + 200 * MS + 1500 * MS + 1 - before, **table).met is met
+
+
+def turn_ends(*parts: Sequence[Event] | Event, end: int = 20 * S, **table: Any) -> GoalOutcome:
+    return outcome("turn_ends", flat(*parts), end, **{"low": ["DD3", "DD4", "DD6"], "within_s": 1, **table})
+
+
+def turning(t: int, lasts: int = 2 * S) -> list[PinEdge]:
+    """Return a turn that goes on for a second where its way is free."""
+    return flat(
+        motors(t - S // 4, 2, 2), pin(t, "DD4"), motors(t, 2, -2, skew=0), pin(t + S, "DD4", False),
+        motors(t + lasts, 3, 3, skew=0),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("t", "met"), [(2 * S - 1, True), (2 * S, True), (2 * S + 1, False)])
+def test_goal_turn_ends_allows_so_long_where_the_way_is_free(t: int, met: bool) -> None:
+    found = turn_ends(turning(S, t))
+    assert found.met is met
+    assert found.robustness == pytest.approx(1 - (t - S) / S, abs=1e-6)
+    assert met or found.says == "it turned on from 2.000 s, where DD3, DD4, DD6 were low, for more than 1 s"
+    assert turn_ends(turning(S, t), lingers_s=0.2).met
+    assert turn_ends(pin(0, "DD6"), turning(S, t)).met  # something else is in the way
+    back = flat(motors(0, 2, 2), motors(S // 2, -2, -2), turning(S, t)[6:])
+    assert turn_ends(back).met  # it did not come forward
+
+
+@pytest.mark.parametrize(("x_m", "met"), [(0.499, True), (0.5, False)])
+def test_goal_turn_ends_judges_so_many_in_one_place(x_m: float, met: bool) -> None:
+    table = {"row": 2, "way_m": 0.5}
+    short = [turning(n * 3 * S, S) for n in (1, 2)]
+    assert not turn_ends(short[0], turning(6 * S, 3 * S), **table).met
+    assert turn_ends(*short, turning(9 * S, 3 * S), **table).met
+    way = [at(8 * S), at(8 * S + S // 2, x_m)]
+    assert turn_ends(at(0), *short, way, turning(9 * S, 3 * S), **table).met is met
+    assert turn_ends(at(0), at(1, x_m), turning(3 * S, S), turning(6 * S, S), turning(9 * S, 3 * S), **table).met
+
+
+@pytest.mark.parametrize(("t", "met"), [(300 * MS - 1, False), (300 * MS, True)])
+def test_goal_turn_ends_does_not_judge_what_comes_out_of_a_passage(t: int, met: bool) -> None:
+    gap = flat(motors(0, 2, 2), pin(S, "DD3"), pin(S, "DD6"))
+    out = flat(pin(S + t, "DD3", False), pin(S + t, "DD6", False), turning(3 * S, 3 * S))
+    table = {"passage": ["DD3", "DD6"], "passage_s": 0.3}
+    assert turn_ends(gap, out, **table).met is met
+    assert not turn_ends(gap, pin(S, "DD4"), pin(S + t - 1, "DD4", False), out, **table).met
+    twice = flat(pin(2 * S - t, "DD3"), pin(2 * S, "DD3", False))
+    assert not turn_ends(gap, pin(S, "DD3", False), out, **table).met
+    assert turn_ends(gap, pin(S + 1, "DD3", False), twice, pin(2 * S, "DD6", False), out[2:], **table).met is met
+    assert not turn_ends(gap, out, turning(8 * S, 3 * S), **table).met  # the next one comes out of none
+
+
+def says(t: int, *pieces: str) -> list[Text]:
+    return [Text(t=t, data=piece.encode()) for piece in pieces]
+
+
+@pytest.mark.parametrize(("t", "met"), [
+    (-100 * MS - 1, False), (-100 * MS, True), (0, True), (100 * MS, True), (100 * MS + 1, False)
+])  # fmt: skip
+def test_goal_reports_motion_wants_a_line_so_long_before_or_after(t: int, met: bool) -> None:
+    drives, turns, line = motors(0, 2, 2), motors(S, 2, -2, skew=0), says(S + t, "car: tu", "rn\n")
+    run = [*drives, *(line if t < 0 else turns), *(turns if t < 0 else line), at(9 * S)]
+    found = outcome("reports_motion", run, motion="turn", matches="turn$", within_s=0.1)
+    assert found.met is met
+    assert met or found.says == "turn began at 1.000 s, and no line with 'turn$' came within 0.1 s"
+    assert not outcome("reports_motion", run, motion="turn", matches="back", within_s=0.1).met
+    assert outcome("reports_motion", run, motion="turn", before=["back"], matches="back", within_s=0.1).met
+
+
+def test_goal_reports_motion_wants_a_line_each_time() -> None:
+    twice = flat(motors(S, 2, -2), motors(S + 10 * MS, 2, 2), motors(S + 20 * MS, 2, -2))
+    table = {"motion": "turn", "matches": "turn", "within_s": 0.1}
+    assert not outcome("reports_motion", flat(twice, says(S + 30 * MS, "turn\n"), at(9 * S)), **table).met
+    assert outcome("reports_motion", flat(twice, says(S + 30 * MS, "turn\n", "turn\n"), at(9 * S)), **table).met
+    assert not outcome("reports_motion", flat(says(S - 1, "turn\n"), twice, at(9 * S)), **table).met
+    assert not outcome("reports_motion", flat(twice, says(S + 30 * MS, "turn", " turn"), at(9 * S)), **table).met
+
+
 def prints(value: str, **table: Any) -> GoalOutcome:
     run = [at(0, left=0.1), at(S, left=0.3), at(2 * S, left=0.2), Text(t=2 * S, data=f"left {value} mm/s\n".encode())]
     return outcome("prints_numbers", run, **{"matches": r"left (-?\d+)", "times": 0.001, **table})
@@ -175,6 +268,9 @@ def test_goal_prints_lines_that_are_known_alone(pieces: list[str], says: str) ->
         ({"kind": "answers", "signal": "mean", "most": 1, "within_s": 1, "high": ["PB99"]}, "no wire 'PB99'"),
         ({"kind": "has_reason", "motion": "turn", "needs": [], "within_s": 1}, "needs is no list"),
         ({"kind": "has_reason", "motion": "turn", "needs": ["PB0"], "within_s": 1}, "no list of lists"),
+        ({"kind": "turn_ends", "low": [], "within_s": 1}, "low is empty"),
+        ({"kind": "turn_ends", "low": ["DD3"], "within_s": 1, "passage": ["DD6"]}, "'DD6' of passage is no pin of low"),
+        ({"kind": "reports_motion", "motion": "turn", "matches": "(", "within_s": 1}, "is no regular expression"),
         ({"kind": "lasts", "motion": "turn"}, "needs least_s or most_s"),
         ({"kind": "prints_numbers", "matches": "left", "most": 1}, "has not one group"),
         ({"kind": "prints_numbers", "matches": "(", "most": 1}, "matches"),
