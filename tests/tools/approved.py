@@ -16,6 +16,8 @@ import random
 import sys
 import zlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import fields, is_dataclass
+from enum import Enum
 from pathlib import Path
 
 import pytest
@@ -30,7 +32,11 @@ def said(value: object) -> str:
     """Return a value as text, each number of it with so many digits that all machines agree."""
     if isinstance(value, float):
         return f"{0.0 if abs(value) < LEAST else value:.{DIGITS}g}"
-    if isinstance(value, dict):
+    if is_dataclass(value) and not isinstance(value, type):
+        return f"{type(value).__name__}{said([getattr(value, part.name) for part in fields(value)])}"
+    if isinstance(value, Enum):
+        return value.name
+    if isinstance(value, Mapping):
         return "{" + ", ".join(f"{said(key)}: {said(each)}" for key, each in value.items()) + "}"
     if isinstance(value, list | tuple):
         return "(" + ", ".join(map(said, value)) + ")"
