@@ -12,7 +12,7 @@ from p2os.pioneer.controller.settings import SonarPerSip
 from p2os.pioneer.devices.laser import LaserModel
 from p2os.pioneer.sensor_errors import REALISTIC
 from p2os.pioneer.world.loader import load_world
-from p2os.protocol.command_table import BY_NUMBER, Argument, CommandRow
+from p2os.protocol.command_table import BY_NUMBER, Argument
 from p2os.protocol.commands import Command
 from p2os.protocol.commands import CommandNumber as C
 from p2os.protocol.profiles import Profile
@@ -23,22 +23,33 @@ from tests.tools.approved import Trace, judge_of, said, tried
 LASER = LaserModel(start_deg=-20, end_deg=20, step_cdeg=200, range_m=8.0)
 #: What moves the robot, and is said more often than the rest.
 DRIVES = (C.VEL, C.RVEL, C.VEL2, C.MOVE, C.HEAD, C.DHEAD, C.ENABLE, C.ROTATE, C.STOP)
-ENDS = {C.CLOSE, C.MAINTENANCE, C.SIM_EXIT, C.RESET}
+ENDS = (C.CLOSE, C.MAINTENANCE, C.SIM_EXIT, C.RESET)
 
 
-def drawn_command(draw: random.Random) -> Command:
-    """Return a command within its range, at an end of it, or with what it does not take."""
-    row: CommandRow = BY_NUMBER[draw.choice(DRIVES)] if draw.random() < 0.5 else draw.choice([*BY_NUMBER.values()])
-    if row.number in ENDS and draw.random() < 0.8:
-        row = BY_NUMBER[C.PULSE]
-    kind = draw.choice(row.kinds)
-    if kind is Argument.NONE:
-        return Command(row.number)
-    least, most = row.limits(kind)
-    if kind in {Argument.STRING, Argument.DATA}:
-        return Command(row.number, draw.randbytes(draw.choice((least, min(most, 4), min(most, 20)))))
-    small = draw.randint(max(least, -400), min(most, 600))
-    return Command(row.number, draw.choice((least, most, small, small, small, max(least, min(most, 1)))))
+def every_command(draw: random.Random) -> list[Command]:
+    """Return each command with the ends of its range, with what is small, and a few that end a session; shuffled."""
+    found = []
+    for row in BY_NUMBER.values():
+        if row.number in ENDS:
+            continue
+        for kind in row.kinds:
+            if kind is Argument.NONE:
+                found.append(Command(row.number))
+                continue
+            least, most = row.limits(kind)
+            if kind in {Argument.STRING, Argument.DATA}:
+                found += [Command(row.number, draw.randbytes(size)) for size in {least, min(most, 3), min(most, 20)}]
+            else:
+                values = {least, most, *(value for value in (0, 1, 2, draw.randint(3, 300)) if least < value < most)}
+                found += [Command(row.number, value) for value in sorted(values)]
+    draw.shuffle(found)
+    return found
+
+
+def drive(draw: random.Random) -> Command:
+    number = draw.choice(DRIVES)
+    value = {C.VEL2: draw.choice((0x1010, 0x0810, 0xF010, 0x1000)), C.ENABLE: 1}.get(number, draw.randint(-400, 400))
+    return Command(number, None if number is C.STOP else value)
 
 
 def drawn_words(draw: random.Random) -> str:
@@ -58,7 +69,7 @@ def drawn_words(draw: random.Random) -> str:
     return " ".join([draw.choice(("fault", "clear")), name, *words])
 
 
-def life(draw: random.Random, model: str, settings: ControllerSettings, steps: int) -> Iterator[str]:
+def life(draw: random.Random, model: str, settings: ControllerSettings, steps: int, each: int) -> Iterator[str]:
     """Yield what a robot shows of a client that says what it likes, and of an operator."""
     parameters, events = load_parameters(model), list[str]()
     body = make_body("kinematic", load_world("room"), parameters)
@@ -66,15 +77,18 @@ def life(draw: random.Random, model: str, settings: ControllerSettings, steps: i
         parameters=parameters, body=body, settings=settings,
         on_event=lambda now, what, detail: events.append(f"{now} {what} {detail}"),
     )  # fmt: skip
-    now = 0
+    now, waiting = 0, every_command(draw)
     for number in range(steps):
-        if pioneer.next_deadline() is None or number % 25 == 0:
-            for sync in (0, 1, 2, C.OPEN):
-                pioneer.receive(Command(sync).to_frame().to_bytes(), now)
-            pioneer.receive(Command(C.ENABLE, 1).to_frame().to_bytes(), now)
-        for _ in range(draw.choice((1, 1, 3))):
-            pioneer.receive(drawn_command(draw).to_frame().to_bytes(), now)
-        match draw.randrange(12):
+        said_now = [*waiting[number * each : (number + 1) * each], drive(draw)]
+        if not pioneer.state.open:
+            said_now = [*map(Command, (0, 1, 2, C.OPEN)), *said_now]
+        if not pioneer.state.motors_enabled:
+            said_now.append(Command(C.ENABLE, 1))
+        if number % 40 == 39:
+            said_now.append(Command(draw.choice([*ENDS])))
+        for command in said_now:
+            pioneer.receive(command.to_frame().to_bytes(), now)
+        match draw.randrange(9):
             case 0 | 1:
                 yield tried(pioneer.do, drawn_words(draw), now)
             case 2:
@@ -88,7 +102,7 @@ def life(draw: random.Random, model: str, settings: ControllerSettings, steps: i
                 pioneer.hang_up(now)
             case 6 if number % 5 == 0:
                 pioneer.count_silence(700 * NS_PER_MS, now)
-        now += draw.choice((7, 100, 100, 230, 700)) * NS_PER_MS
+        now += draw.choice((7, 30, 100, 100, 100, 230, 700)) * NS_PER_MS
         pioneer.advance_to(now)
         yield " ".join([f"{now} due {pioneer.next_deadline()}", *(frame.hex() for frame in pioneer.take_output())])
         yield said((pioneer.state, pioneer.stats, pioneer.exit_code, body.state, events))
@@ -97,7 +111,7 @@ def life(draw: random.Random, model: str, settings: ControllerSettings, steps: i
 
 def plain(draw: random.Random) -> Iterator[str]:
     for profile, model in zip(Profile, ("p2dx", "p2at8", "p3dx-sh"), strict=True):
-        yield from life(draw, model, ControllerSettings(profile=profile, seed=1), 50)
+        yield from life(draw, model, ControllerSettings(profile=profile, seed=1), 120, 4)
 
 
 def erring(draw: random.Random) -> Iterator[str]:
@@ -106,13 +120,13 @@ def erring(draw: random.Random) -> Iterator[str]:
             profile=profile, errors=REALISTIC, baud=draw.choice((9600, 19200)), seed=2, battery_decivolts=118,
             sonar_per_sip=SonarPerSip.ALL, rear_sonar=True, watchdog_ns=600 * NS_PER_MS,
         )  # fmt: skip
-        yield from life(draw, model, chosen, 30)
+        yield from life(draw, model, chosen, 45, 8)
 
 
 def simulated(draw: random.Random) -> Iterator[str]:
     chosen = replace(ControllerSettings.for_client("aria"), laser=LASER, lenient=True)
     for model in ("p3dx", "amigo-sh"):
-        yield from life(draw, model, chosen, 30)
+        yield from life(draw, model, chosen, 45, 8)
 
 
 TRACES: dict[str, Trace] = {each.__name__: each for each in (plain, erring, simulated)}
