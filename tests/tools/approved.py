@@ -13,6 +13,7 @@ import argparse
 import importlib
 import json
 import random
+import re
 import sys
 import zlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -26,6 +27,9 @@ import pytest
 Trace = Callable[[random.Random], Iterable[str]]
 #: Digits of a number that every machine works out alike, and below which it is 0.
 DIGITS, LEAST = 6, 1e-9
+#: Characters of a line that a test shows.
+SHOWN = 4000
+_FRACTION = re.compile(r"-?\d+\.\d{3,}(?:e[-+]?\d+)?|-?\d+e-\d+")
 
 
 def said(value: object) -> str:
@@ -41,6 +45,11 @@ def said(value: object) -> str:
     if isinstance(value, list | tuple):
         return "(" + ", ".join(map(said, value)) + ")"
     return str(value)
+
+
+def rounded(text: str) -> str:
+    """Return a text of a program with each fraction in it as `said` says it."""
+    return _FRACTION.sub(lambda found: said(float(found[0])), text)
 
 
 def tried(action: Callable[..., object], *arguments: object, **named: object) -> str:
@@ -63,7 +72,7 @@ def judge_of(file: str, traces: Mapping[str, Trace]) -> Callable[..., None]:
         lines, right = _lines(name, traces[name]), _approved(Path(file)).get(name, ())
         for number, (line, checksum) in enumerate(zip(lines, right, strict=False)):
             if _checksum(line) != checksum:
-                pytest.fail(f"{name}, line {number} is otherwise than approved; now it is\n  {line}\n{_hint(file)}")
+                pytest.fail(f"{name}, line {number} is otherwise than approved; now it is\n  {line[:SHOWN]}\n{_hint(file)}")
         assert len(lines) == len(right), _hint(file)
 
     return judged

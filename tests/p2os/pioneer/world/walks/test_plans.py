@@ -14,7 +14,7 @@ from p2os.pioneer.world.start_places import floor_height, start_places
 from p2os.pioneer.world.writer import write_world
 from p2os.robots.parameters import load_parameters
 from tests.p2os.pioneer.world.walks.things import drawn_mesh, drawn_thing, drawn_walk, drawn_world
-from tests.tools.approved import Trace, judge_of, said, tried
+from tests.tools.approved import Trace, judge_of, rounded, said, tried
 
 P2DX, PATROLBOT = load_parameters("p2dx"), load_parameters("patrolbot-sh")
 
@@ -22,13 +22,13 @@ P2DX, PATROLBOT = load_parameters("p2dx"), load_parameters("patrolbot-sh")
 def makers(draw: random.Random) -> Iterator[str]:
     for kind in KINDS:
         for seed in range(3):
-            yield from write_world(make_world(kind, seed)).splitlines()
+            yield rounded(write_world(make_world(kind, seed)))
 
 
 def shipped(draw: random.Random) -> Iterator[str]:
     for name in known_worlds():
         world = load_world(name, 7)
-        yield from write_world(world).splitlines()
+        yield rounded(write_world(world))
         yield said(world.to_plain())
 
 
@@ -113,12 +113,12 @@ def plans(draw: random.Random) -> Iterator[str]:
 def pictures(draw: random.Random) -> Iterator[str]:
     for _ in range(6):
         world = drawn_world(draw)
-        yield from drawing.svg(world).splitlines()
+        yield drawing.svg(world)
         for columns in (5, 40, 61):
-            yield from drawing.text(world, columns)
+            yield "\n".join(drawing.text(world, columns))
             yield drawing.text_key(world, columns)
     for name in ("office", "walkway"):
-        yield from drawing.svg(load_world(name, 1), side_px=300).splitlines()
+        yield drawing.svg(load_world(name, 1), side_px=300)
     yield said([drawing.grid_step(span) for span in (0.3, 0.99, 1.0, 1.01, 4.9, 5.0, 9.9, 10.0, 10.1, 20.0, 51.0, 100.0)])
     yield said([drawing.ticks(-1.0, 1.0, 0.5), drawing.ticks(-0.9, 1.1, 0.5)])
 
@@ -131,7 +131,7 @@ def placings(draw: random.Random) -> Iterator[str]:
             scale=draw.choice((1.0, 2.0, 3.0)),
         )  # fmt: skip
         yield said(placing.is_identity)
-        yield from write_world(placed_world(world, placing)).splitlines()
+        yield rounded(write_world(placed_world(world, placing)))
     yield said([with_z_up([(1.0, 2.0, 3.0)], up) for up in ("x", "y", "z")])
     yield said([Placing().is_identity, *(Placing(**{key: 0.5}).is_identity for key in ("x_m", "y_m", "z_m", "scale"))])
     yield said([tried(Placing, scale=scale) for scale in (0.0, -1.0, math.inf, 1e-9)])
