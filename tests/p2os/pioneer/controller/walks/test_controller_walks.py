@@ -1,0 +1,133 @@
+"""Clients and operators that do anything to a robot of each firmware, against what was approved: bytes, events, state."""
+
+import random
+from collections.abc import Iterator
+from dataclasses import replace
+
+from p2os.pioneer.body.factory import make_body
+from p2os.pioneer.controller import ControllerSettings, Pioneer
+from p2os.pioneer.controller.faults import FAULTS
+from p2os.pioneer.controller.live_inputs import INPUTS
+from p2os.pioneer.controller.settings import SonarPerSip
+from p2os.pioneer.devices.laser import LaserModel
+from p2os.pioneer.sensor_errors import REALISTIC
+from p2os.pioneer.world.loader import load_world
+from p2os.protocol.command_table import BY_NUMBER, Argument
+from p2os.protocol.commands import Command
+from p2os.protocol.commands import CommandNumber as C
+from p2os.protocol.profiles import Profile
+from p2os.robots.parameters import load_parameters
+from simbase.timing import NS_PER_MS
+from tests.tools.approved import Trace, judge_of, said, tried
+
+LASER = LaserModel(start_deg=-20, end_deg=20, step_cdeg=200, range_m=8.0)
+#: What moves the robot, and is said more often than the rest.
+DRIVES = (C.VEL, C.RVEL, C.VEL2, C.MOVE, C.HEAD, C.DHEAD, C.ENABLE, C.ROTATE, C.STOP)
+ENDS = (C.CLOSE, C.MAINTENANCE, C.SIM_EXIT, C.RESET)
+
+
+def every_command(draw: random.Random) -> list[Command]:
+    """Return each command with the ends of its range, with what is small, and a few that end a session; shuffled."""
+    found = []
+    for row in BY_NUMBER.values():
+        if row.number in ENDS:
+            continue
+        for kind in row.kinds:
+            if kind is Argument.NONE:
+                found.append(Command(row.number))
+                continue
+            least, most = row.limits(kind)
+            if kind in {Argument.STRING, Argument.DATA}:
+                found += [Command(row.number, draw.randbytes(size)) for size in {least, min(most, 3), min(most, 20)}]
+            else:
+                values = {least, most, *(value for value in (0, 1, 2, draw.randint(3, 300)) if least < value < most)}
+                found += [Command(row.number, value) for value in sorted(values)]
+    draw.shuffle(found)
+    return found
+
+
+def drive(draw: random.Random) -> Command:
+    number = draw.choice(DRIVES)
+    value = {C.VEL2: draw.choice((0x1010, 0x0810, 0xF010, 0x1000)), C.ENABLE: 1}.get(number, draw.randint(-400, 400))
+    return Command(number, None if number is C.STOP else value)
+
+
+def drawn_words(draw: random.Random) -> str:
+    """Return what an operator says: a fault that begins or ends, or an input."""
+    word = {
+        "NUMBER": str(draw.randint(1, 9)), "METRES": draw.choice(("0.5", "1", "101")), "SIDE": draw.choice(("left", "front")),
+        "RATE": draw.choice(("0.001", "0.6")), "VOLTS": draw.choice(("10.5", "11.9")), "SEGMENT": str(draw.randint(0, 6)),
+        "X": str(draw.choice((0, 512, 1023))), "Y": str(draw.choice((0, 800, 1024))), "BUTTON": draw.choice(("0", "1", "2")),
+        "PORT": str(draw.randint(0, 10)), "RAW": str(draw.choice((0, 700, 1023))), "BYTE": str(draw.choice((0, 129, 256))),
+        "ON_OFF": draw.choice(("on", "off", "on", "maybe")),
+    }  # fmt: skip
+    if draw.random() < 0.5:
+        name = draw.choice([*INPUTS])
+        return " ".join([name, *(word[each] for each in INPUTS[name][0])])
+    name = draw.choice([*FAULTS])
+    words = [word[each] for each in FAULTS[name][0]][: draw.choice((0, 2, 2, 2))]
+    return " ".join([draw.choice(("fault", "clear")), name, *words])
+
+
+def life(draw: random.Random, model: str, settings: ControllerSettings, steps: int, each: int) -> Iterator[str]:
+    """Yield what a robot shows of a client that says what it likes, and of an operator."""
+    parameters, events = load_parameters(model), list[str]()
+    body = make_body("kinematic", load_world("room"), parameters)
+    pioneer = Pioneer(
+        parameters=parameters, body=body, settings=settings,
+        on_event=lambda now, what, detail: events.append(f"{now} {what} {detail}"),
+    )  # fmt: skip
+    now, waiting = 0, every_command(draw)
+    for number in range(steps):
+        said_now = [*waiting[number * each : (number + 1) * each], drive(draw)]
+        if not pioneer.state.open:
+            said_now = [*map(Command, (0, 1, 2, C.OPEN)), *said_now]
+        if not pioneer.state.motors_enabled:
+            said_now.append(Command(C.ENABLE, 1))
+        if number % 40 == 39:
+            said_now.append(Command(draw.choice([*ENDS])))
+        for command in said_now:
+            pioneer.receive(command.to_frame().to_bytes(), now)
+        match draw.randrange(9):
+            case 0 | 1:
+                yield tried(pioneer.do, drawn_words(draw), now)
+            case 2:
+                pioneer.receive_aux(port := draw.randint(1, 3), draw.randbytes(6), now)
+                yield pioneer.take_aux_output(port).hex()
+            case 3:
+                pioneer.restore(pioneer.snapshot())
+            case 4 if number % 3 == 0:
+                pioneer.receive(draw.randbytes(9), now)
+            case 5 if number % 5 == 0:
+                pioneer.hang_up(now)
+            case 6 if number % 5 == 0:
+                pioneer.count_silence(700 * NS_PER_MS, now)
+        now += draw.choice((7, 30, 100, 100, 100, 230, 700)) * NS_PER_MS
+        pioneer.advance_to(now)
+        yield " ".join([f"{now} due {pioneer.next_deadline()}", *(frame.hex() for frame in pioneer.take_output())])
+        yield said((pioneer.state, pioneer.stats, pioneer.exit_code, body.state, events))
+        events.clear()
+
+
+def plain(draw: random.Random) -> Iterator[str]:
+    for profile, model in zip(Profile, ("p2dx", "p2at8", "p3dx-sh"), strict=True):
+        yield from life(draw, model, ControllerSettings(profile=profile, seed=1), 120, 4)
+
+
+def erring(draw: random.Random) -> Iterator[str]:
+    for profile, model in zip(Profile, ("p2de", "peoplebot-sh", "p3at"), strict=True):
+        chosen = ControllerSettings(
+            profile=profile, errors=REALISTIC, baud=draw.choice((9600, 19200)), seed=2, battery_decivolts=118,
+            sonar_per_sip=SonarPerSip.ALL, rear_sonar=True, watchdog_ns=600 * NS_PER_MS,
+        )  # fmt: skip
+        yield from life(draw, model, chosen, 45, 8)
+
+
+def simulated(draw: random.Random) -> Iterator[str]:
+    chosen = replace(ControllerSettings.for_client("aria"), laser=LASER, lenient=True)
+    for model in ("p3dx", "amigo-sh"):
+        yield from life(draw, model, chosen, 45, 8)
+
+
+TRACES: dict[str, Trace] = {each.__name__: each for each in (plain, erring, simulated)}
+test_what_was_approved_is_shown = judge_of(__file__, TRACES)
