@@ -318,7 +318,10 @@ class ContactAnalysis:
             return Finding("no sensor near the place had its pin high before; whether one should have had is not known",
                            is_cause=False)  # fmt: skip
         since, effect = min(self.on.values()), self._effect
-        took = "" if effect.answered is None else f" {(effect.answered - since) / 1e6:.0f} ms after"
+        if effect.answered is None:
+            return Finding(f"the program noticed {numbers(list(self.on))} and did nothing about it before the contact; "
+                           "whether that was right is not known", is_cause=False)  # fmt: skip
+        took = f" {(effect.answered - since) / 1e6:.0f} ms after"
         given, without = effect.before, effect.after
         if given == without and effect.otherwise is not None:
             given, without = effect.otherwise  # it answered, and has done with it

@@ -199,8 +199,8 @@ def ended(prober: Prober, silent: Nanos, failed: Nanos, steps: list[ChainLink]) 
     gone = [line for line in before if line not in after]
     variables = ran_over(prober, since)
     if len(now) <= LOOP_LINES:
-        steps.append(ChainLink(t=silent, part="firmware", says=f"runs {numbers(doing[:NAMED])} and nothing else",
-                               evidence=Evidence.REPLAYED))  # fmt: skip
+        runs = f"runs {numbers(doing[:NAMED])} and nothing else" if doing else "runs nothing"
+        steps.append(ChainLink(t=silent, part="firmware", says=runs, evidence=Evidence.REPLAYED))
         return Finding(f"{says}: it is stuck at {doing[0]}" if doing else f"{says}: it stands still")
     if gone:
         steps.append(ChainLink(t=since, part="firmware", says=f"runs for the last time: {numbers(gone[:NAMED])}",
