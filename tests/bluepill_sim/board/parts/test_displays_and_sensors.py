@@ -455,7 +455,7 @@ def test_what_is_at_the_ends_can_be(plugged: Plug) -> None:
         pot.position = position
         assert (pot.position, pot.words()) == (position, f"at {100 * position:.0f} %")
     assert Potentiometer(sweep_s=1).words() == "sweeps"
-    with pytest.raises(ValueError, match="a position of -0[.]1: 0 to 1"):
+    with pytest.raises(ValueError, match=r"a position of -0[.]1: 0 to 1"):
         pot.position = -0.1
 
 
