@@ -414,3 +414,195 @@ def test_a_potentiometer_gives_its_share_or_sweeps(plugged: Plug) -> None:
     swept = plugged(Potentiometer(sweep_s=2.0), "wiper").pins["wiper"].volts
     assert isinstance(swept, Oscillation)
     assert swept.period_ns == 2 * 10**9
+
+
+# What they are asked for, and what they say.
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: Mpu6050(address=0x67), "no MPU-6050 at 0x67 and 25.0 degrees: 0x68 or 0x69, -40 to 85"),
+        (lambda: Mpu6050(temperature_c=-40.1), "no MPU-6050 at 0x68 and -40.1 degrees: 0x68 or 0x69, -40 to 85"),
+        (lambda: Mpu6050(temperature_c=85.1), "no MPU-6050 at 0x68 and 85.1 degrees: 0x68 or 0x69, -40 to 85"),
+        (lambda: Ssd1306(height=48), "no SSD1306 at 0x3c with 48 rows: 0x3C or 0x3D, 32 or 64"),
+        (lambda: Gps(latitude_deg=-90), "no place on Earth: -90, 11.575"),
+        (lambda: Gps(longitude_deg=180.5), "no place on Earth: 48.137, 180.5"),
+        (lambda: Gps(rate_hz=7, baud=10_499), "7 fixes a second do not fit into 10499 bit/s: 10500 at the least"),
+        (lambda: Gps(rate_hz=11), "11 fixes a second: 1 to 10"),
+        (lambda: Button(held_s=0), "held for 0 s with 3 ms of bounces: it is held longer than it bounces"),
+        (lambda: Button(held_s=0.002), "held for 0.002 s with 3 ms of bounces: it is held longer than it bounces"),
+        (lambda: Button(bounce_ms=-1), "held for 0.1 s with -1 ms of bounces: it is held longer than it bounces"),
+        (lambda: Button(presses_s=(2.0, 1.0, 2.05)), "a press at 2.05 s begins before 2.103 s"),
+        (lambda: Button(presses_s=(-1.0,)), "a press at -1 s begins before 0 s"),
+        (lambda: Potentiometer(position=-0.01), "a position of -0.01 and 0.0 s: 0 to 1, and 0 or more"),
+        (lambda: Potentiometer(position=1.01), "a position of 1.01 and 0.0 s: 0 to 1, and 0 or more"),
+        (lambda: Potentiometer(sweep_s=-1), "a position of 0.5 and -1 s: 0 to 1, and 0 or more"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_is_refused_in_these_words(make: Callable[[], object], said: str) -> None:
+    with pytest.raises(ValueError, match=r"\d") as caught:
+        make()
+    assert str(caught.value) == said
+
+
+def test_what_is_at_the_ends_can_be(plugged: Plug) -> None:
+    assert [Mpu6050(address=0x69, temperature_c=-40), Mpu6050(temperature_c=85), Gps(rate_hz=10, baud=15_000)]
+    assert [Gps(longitude_deg=-180), Gps(longitude_deg=180, latitude_deg=89.9), Button(held_s=0.003)]
+    for position, volts in ((0.0, 0.5), (1.0, 2.5), (0.25, 1.0)):
+        pot = Potentiometer(position=position, from_v=0.5, to_v=2.5)
+        assert plugged(pot, "wiper").pins["wiper"].volts == volts
+        pot.position = position
+        assert (pot.position, pot.words()) == (position, f"at {100 * position:.0f} %")
+    assert Potentiometer(sweep_s=1).words() == "sweeps"
+    with pytest.raises(ValueError, match=r"a position of -0[.]1: 0 to 1"):
+        pot.position = -0.1
+
+
+@pytest.mark.parametrize("time", ["24:00:00", "23:60:00", "23:59:60"])
+def test_a_day_ends_with_its_last_second(time: str) -> None:
+    with pytest.raises(ValueError, match=f"'2026-12-31T{time}' is no time such as 2026-01-31T12:00:00"):
+        Gps(start=f"2026-12-31T{time}")
+
+
+def test_the_sentences_of_the_defaults() -> None:
+    # 1 km to the south and to the east of 48 deg 8.22' N, 11 deg 34.5' E, 520 m above WGS 84.
+    gps, motion = Gps(), BoardMotion(x_m=1000.0, y_m=-1000.0, z_m=1.25, heading_rad=0.0, forward_mps=-1.0)
+    assert gps.sentences(motion, 2 * 10**9 - 1) == (
+        b"$GPGGA,000001.99,,,,,0,00,99.99,,,,,,*67\r\n", b"$GPRMC,000001.99,V,,,,,,,010126,,,N*78\r\n",
+    )  # fmt: skip
+    assert gps.sentences(motion, 2 * 10**9) == (
+        b"$GPGGA,000002.00,4807.68044,N,01135.30609,E,1,08,1.00,521.2,M,0.0,M,,*6C\r\n",
+        b"$GPRMC,000002.00,A,4807.68044,N,01135.30609,E,1.944,270.00,010126,,,A*6A\r\n",
+    )
+    assert gps.words() == "0 fixes sent"
+
+
+def test_leds_and_strings_say_and_show_what_shines(plugged: Plug) -> None:
+    panel = LedPanel()
+    socket = plugged(panel, "led0", "led2")
+    assert (panel.words(), panel.lit_ns("led2")) == ("no LED lit after 0 changes", 0)
+    panel.changed([(5, "led2", True), (7, "led2", True), (9, "led0", False)])
+    socket.now_ns = 11
+    assert (panel.words(), panel.lit_ns("led2")) == ("led2 lit after 3 changes", 6)
+    row = ((60, 20, 16),) * 3 + ((0, 0, 0),) + ((255, 60, 40),) * 3
+    assert panel.picture() == Picture((row,) * 3)
+
+
+def test_an_oled_shows_its_dots_in_their_colours_and_counts_them() -> None:
+    oled = upright(height=32)
+    commands(oled, 0xA8, 31, 0xB0, 0x00, 0x10, 0xFF, 0x26, 0, 0, 0, 0, 0, 0xFF, 0x2E, 0xE3, 0x8D, 0x14)
+    send(oled, 0x40, 0x81)
+    assert oled.words() == "128x32, on, 2 dots lit, 2 commands ignored"
+    rows = [[(0, 0, 0)] * 128 for _ in range(32)]
+    rows[0][0] = rows[7][0] = (210, 235, 255)
+    assert oled.picture() == Picture(tuple(map(tuple, rows)))
+    commands(oled, 0xAE)
+    assert oled.words() == "128x32, off, 0 dots lit, 2 commands ignored"
+
+
+@pytest.mark.parametrize(("ratio", "rows"), [(0, 16), (14, 16), (15, 16), (16, 17), (63, 64)])
+def test_the_glass_shows_as_many_rows_as_the_ratio_says_and_never_below_sixteen(ratio: int, rows: int) -> None:
+    oled = upright()
+    commands(oled, 0xA8, ratio, 0xA5)
+    assert lit(oled) == {(x, y) for x in range(128) for y in range(64 - rows, 64)}
+
+
+#: DLPF_CFG: bandwidth of accelerometer and gyroscope in Hz, and the rate in kHz that SMPLRT_DIV divides (RM 4.3).
+FILTERS = [(260, 256, 8), (184, 188, 1), (94, 98, 1), (44, 42, 1), (21, 20, 1), (10, 10, 1), (5, 5, 1), (260, 256, 8)]
+
+
+@pytest.mark.parametrize("dlpf", range(8))
+def test_every_axis_goes_through_the_low_pass_of_its_sensor(plugged: Plug, dlpf: int) -> None:
+    imu, socket = awake(plugged, dlpf=dlpf, divider=3)
+    socket.surroundings.now = BoardMotion(force_mps2=(0, 0, 0))
+    run(imu, 1)
+    g = 9.80665
+    socket.surroundings.now = BoardMotion(force_mps2=(g, -g / 2, g / 4), rates_radps=(4.0, -2.0, 1.0))
+    run(imu, 1)
+    *bands, khz = FILTERS[dlpf]
+    shares = [1 - math.exp(-2 * math.pi * band * 4 / khz / 1000) for band in bands]
+    wanted = [*(shares[0] * 16384 * part for part in (1, -0.5, 0.25)), (25 - 36.53) * 340, *(
+        shares[1] * 131 * math.degrees(rate) for rate in (4, -2, 1))]  # fmt: skip
+    assert struct.unpack(">7h", get(imu, 0x3B, 14)) == pytest.approx(wanted, abs=0.501)
+
+
+def test_a_write_changes_the_bits_that_a_register_has_and_no_others() -> None:
+    imu = Mpu6050()
+    before = get(imu, 0, 0x72)
+    for number in range(0x80):
+        if number not in {0x6B, 0x6A}:
+            put(imu, number, 0xFF)
+    put(imu, 0x6B, 0x7F)
+    put(imu, 0x6A, 0xFF)
+    wanted = bytearray(before)
+    wanted[0x06:0x0C] = wanted[0x13:0x19] = b"\xff" * 6
+    for number, bits in {0x19: 0xFF, 0x1A: 0x3F, 0x1B: 0xF8, 0x1C: 0xF8, 0x23: 0xFF, 0x37: 0xFE, 0x38: 0x19,
+                         0x6A: 0x70, 0x6B: 0x6F, 0x6C: 0xFF}.items():  # fmt: skip
+        wanted[number] = bits
+    assert get(imu, 0, 0x72).hex() == wanted.hex()
+
+
+#: The bits of FIFO_EN, and what each puts into the FIFO: bytes of 3B to 48 (RM 4.9).
+@pytest.mark.parametrize(
+    ("bits", "parts"), [(0x08, "0-6"), (0x80, "6-8"), (0x40, "8-10"), (0x20, "10-12"), (0x10, "12-14"), (0x07, "0-0"),
+                        (0xF8, "0-14")],
+)  # fmt: skip
+def test_the_fifo_takes_what_its_bits_say_in_the_order_of_the_registers(plugged: Plug, bits: int, parts: str) -> None:
+    imu, socket = awake(plugged)
+    socket.surroundings.now = BoardMotion(force_mps2=(1, 2, 3), rates_radps=(0.1, 0.2, 0.3))
+    put(imu, 0x23, bits)
+    put(imu, 0x6A, 0x40)
+    run(imu, 1)
+    begin, end = map(int, parts.split("-"))
+    sample = get(imu, 0x3B, 14)
+    assert int.from_bytes(get(imu, 0x72, 2), "big") == end - begin
+    assert get(imu, 0x74, 15) == sample[begin:end].ljust(15, b"\xff"), "0xFF where it is empty"
+
+
+@pytest.mark.parametrize(
+    ("bit", "at"), [(0x20, 0), (0x10, 2), (0x08, 4), (0x04, 8), (0x02, 10), (0x01, 12)]
+)  # fmt: skip
+def test_each_axis_has_a_standby_of_its_own(plugged: Plug, bit: int, at: int) -> None:
+    imu, socket = awake(plugged)
+    socket.surroundings.now = BoardMotion(force_mps2=(1, 2, 3), rates_radps=(0.1, 0.2, 0.3))
+    put(imu, 0x6C, bit)
+    run(imu, 1)
+    values = struct.unpack(">7h", get(imu, 0x3B, 14))
+    assert [place for place, value in enumerate(values) if value == 0] == [at // 2]
+
+
+def test_int_may_be_active_low_and_any_read_may_clear_it(plugged: Plug) -> None:
+    imu, socket = awake(plugged, "int")
+    levels = socket.pins["int"].later
+    put(imu, 0x37, 0xB0, at_ns=3)
+    assert levels == [(3, 1)], "it lets go, high now"
+    put(imu, 0x38, 0x01)
+    at_ns = run(imu, 1)
+    get(imu, 0x75, at_ns=at_ns + 5)
+    assert levels[1:] == [(at_ns, 0), (at_ns + 5, 1)]
+    assert get(imu, 0x3A, at_ns=at_ns + 6) == b"\0"
+
+
+def test_its_words_have_what_it_measures_in_g_and_degrees_a_second(plugged: Plug) -> None:
+    imu, socket = awake(plugged)
+    put(imu, 0x1B, 3 << 3, 2 << 3)
+    socket.surroundings.now = BoardMotion(
+        force_mps2=(9.80665, -4.903325, 0.0), rates_radps=(math.radians(90), 0.0, math.radians(-45.5))
+    )
+    run(imu, 1)
+    assert imu.words() == "1 samples, +1.00, -0.50, +0.00 g, +90.0, +0.0, -45.5 deg/s"
+
+
+def test_a_reset_of_the_signal_path_empties_the_sample_and_that_of_the_fifo_the_fifo(plugged: Plug) -> None:
+    imu, _ = awake(plugged)
+    put(imu, 0x23, 0x08)
+    put(imu, 0x6A, 0x40)
+    run(imu, 1)
+    put(imu, 0x68, 0x07)
+    assert (get(imu, 0x3B, 14), get(imu, 0x72, 2)) == (bytes(14), b"\0\x06")
+    run(imu, 1)
+    put(imu, 0x6A, 0x41)
+    assert (get(imu, 0x3B, 14), get(imu, 0x72, 2)) == (bytes(14), b"\0\x0c")
+    put(imu, 0x6A, 0x44)
+    assert get(imu, 0x72, 2) == b"\0\0"

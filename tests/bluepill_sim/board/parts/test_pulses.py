@@ -174,3 +174,55 @@ def test_every_colour_comes_through_an_spi_as_three_bits_a_bit(colours: list[tup
     part.advance_to(part.next_deadline() or 0)
     assert part.shown == colours
     assert part.out_of_limits == 0
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: HcSr04(distance_m=-0.1), "a distance of -0.1 m"),
+        (lambda: HcSr04(temperature_c=-40.5), "-40.5 degrees and 5.0 V: -40 to 80, and up to 5.5 V"),
+        (lambda: HcSr04(temperature_c=80.5), "80.5 degrees and 5.0 V: -40 to 80, and up to 5.5 V"),
+        (lambda: HcSr04(echo_v=0), "20.0 degrees and 0 V: -40 to 80, and up to 5.5 V"),
+        (lambda: HcSr04(echo_v=5.6), "20.0 degrees and 5.6 V: -40 to 80, and up to 5.5 V"),
+        (lambda: Ws2812(leds=0), "a string of 0 with a reset of 50.0 us: 1 to 1024, and 1 us or more"),
+        (lambda: Ws2812(leds=1025), "a string of 1025 with a reset of 50.0 us: 1 to 1024, and 1 us or more"),
+        (lambda: Ws2812(reset_us=0.5), "a string of 8 with a reset of 0.5 us: 1 to 1024, and 1 us or more"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_these_words(make: Callable[[], object], said: str) -> None:
+    with pytest.raises(ValueError, match=r"\d") as caught:
+        make()
+    assert str(caught.value) == said
+
+
+def test_what_is_at_the_ends_can_be() -> None:
+    assert [
+        HcSr04(distance_m=0, temperature_c=-40, echo_v=5.5),
+        HcSr04(temperature_c=80),
+        Ws2812(leds=1024, reset_us=1),
+    ]
+    for settings in ({"least_us": 0}, {"least_us": 2000}, {"least_deg": 90.0}, {"deg_per_s": 0.0}):
+        with pytest.raises(ValueError, match=r"\d"):
+            Servo(**settings)
+
+
+def test_a_string_says_four_colours_and_its_worst_pulse_and_shows_squares(plugged: Plug) -> None:
+    part = Ws2812(leds=5)
+    plugged(part, "din")
+    assert part.words() == "#000000 #000000 #000000 #000000 ... after 0 frames"
+    end = bits_of(part, 0x102030, 0)
+    pulse(part, "din", end, 1000)  # 50 ns beyond, and so is the next
+    pulse(part, "din", end + 1000 + 400, 200)
+    end = bits_of(part, 0, end + 2800, count=22)
+    part.advance_to(part.next_deadline() or 0)
+    words = "high of a 1 of 1000 ns, not 650 to 950"
+    assert part.words().endswith(f" ... after 1 frames, 3 times beyond its limits ({part.worst[1]})")
+    assert part.shown[0] == (0x20, 0x10, 0x30)
+    four = Ws2812(leds=4)
+    plugged(four, "din")
+    pulse(four, "din", 0, 1000)
+    pulse(four, "din", 1300, 200)
+    assert four.words() == f"#000000 #000000 #000000 #000000 after 0 frames, 2 times beyond its limits ({words})"
+    four.shown = [(1, 2, 3), (4, 5, 6), (7, 8, 9), (10, 11, 12)]
+    row = [colour for one in four.shown for colour in [one] * 6 + [(0, 0, 0)]][:-1]
+    assert four.picture().rows == (tuple(row),) * 6

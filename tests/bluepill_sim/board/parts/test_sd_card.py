@@ -138,7 +138,7 @@ def test_a_block_comes_no_sooner_than_its_time_and_writing_takes_its_time() -> N
     began = host.now_ns
     host.until(0xFE)
     # The command ended two bytes before R1; the token follows the byte at which the block is there.
-    assert READ_NS - 2 * BYTE_NS <= host.now_ns - began <= READ_NS
+    assert host.now_ns - began == READ_NS - BYTE_NS
     host.read(514)
     host.command(24, 0)
     host.send(0xFE, *BLOCK, 0, 0)
@@ -199,6 +199,68 @@ def test_csd_and_cid_have_its_size_and_their_own_crc() -> None:
     host.command(10)
     cid = host.block(count=16)
     assert cid[15] == crc7(cid[:15])
+
+
+#: Of a card of 1 GiB, as section 5 has them, without their CRCs.
+CSD = bytes.fromhex("400e00325b59000007ff7f800a4000")
+CID = b"\x00P2BENCH\x10\x00\x00\x00\x01\x01\xa1"
+
+
+def data(contents: bytes) -> bytes:
+    return b"\xfe" + contents + crc16(contents).to_bytes(2, "big")
+
+
+def test_every_command_is_answered_as_the_specification_has_it() -> None:
+    host = Host(SdCard(size_mb=1024)).start()
+    beyond = 1 << 21  # the first block that is not there
+    good = {
+        8: b"\0\0\1\xaa", 9: data(CSD + bytes((crc7(CSD),))), 10: data(CID + bytes((crc7(CID),))), 12: b"", 13: b"\0",
+        38: b"", 55: b"", 58: b"\xc0\xff\x80\0", 59: b"",
+    }  # fmt: skip
+    refused = {16: 0x40, 17: 0x20, 18: 0x20, 24: 0x20, 25: 0x20, 32: 0x20, 33: 0x20}
+    found = {number: (host.command(number, {8: 0x1AA, 59: 0}.get(number, beyond)), host.read(24)) for number in
+             range(1, 64) if number != 38}  # fmt: skip
+    assert found == {number: (4, b"\xff" * 24) for number in range(1, 64) if number != 38} | {
+        number: (0, text.ljust(24, b"\xff")) for number, text in good.items() if number != 38
+    } | {number: (error, b"\xff" * 24) for number, error in refused.items()}
+    assert host.command(16, BLOCK_BYTES) == 0
+
+
+def test_every_command_of_applications_is_known_behind_cmd55_alone() -> None:
+    host = Host(SdCard()).start()
+    scr = bytes.fromhex("0225800000000000")
+    good = {13: b"\0" + data(bytes(64)), 22: data(bytes(4)), 23: b"", 41: b"", 51: data(scr)}
+    found = {number: (host.app(number), host.read(70)) for number in (*good, 14, 42, 52)}
+    assert found == {number: (0, text.ljust(70, b"\xff")[:70]) for number, text in good.items()} | dict.fromkeys(
+        (14, 42, 52), (4, b"\xff" * 70)
+    )
+    assert [host.command(number) for number in (22, 23, 41, 51)] == [4] * 4
+    assert host.app(9) == 0, "one that is of all cards is that behind CMD55, too"
+
+
+def test_a_command_may_come_while_a_block_is_awaited_and_the_stop_takes_its_time() -> None:
+    card = SdCard()
+    host = Host(card).start()
+    assert host.command(25, 7) == 0
+    assert host.command(13) == 0
+    assert host.read(1) == b"\0"
+    host.send(0xFC, *BLOCK, 0, 0)
+    assert host.read(1)[0] & 0x1F == 5
+    host.until(0xFF)
+    host.send(0xFD)
+    began = host.now_ns
+    assert host.read(2) == b"\xff\0"
+    host.until(0xFF)
+    assert (host.now_ns - began, [*card.written]) == (WRITE_NS, [7])
+    assert card.words() == "8 MiB, 0 blocks read, 1 written"
+    host.command(60)
+    assert card.words() == "8 MiB, 0 blocks read, 1 written, 1 commands refused"
+
+
+@pytest.mark.parametrize("size_mb", [0, 1025, -1])
+def test_no_card_is_empty_or_larger_than_a_gibibyte(size_mb: int) -> None:
+    with pytest.raises(ValueError, match="up to 1024 MiB"):
+        SdCard(size_mb=size_mb)
 
 
 def test_erased_blocks_are_empty_and_their_neighbours_are_not(tmp_path: Path) -> None:

@@ -1,0 +1,93 @@
+"""What verbs of `p2os mcu` answer about two committed programs, whole: each line, figure and file.
+
+`python -m tests.bluepill_sim.cli.test_whole_answers` writes the answers anew, after a change that means them to differ;
+their difference is read as any other change is.
+"""
+
+import contextlib
+import hashlib
+import io
+import shlex
+import tempfile
+import zipfile
+import zlib
+from pathlib import Path
+
+import pytest
+
+from bluepill_sim.__main__ import run
+from tests.bluepill_sim.board.parts.test_attaching import ATTACHED
+from tests.bluepill_sim.board.parts.test_attaching import PROGRAM as PARTS
+from tests.tools.examples import EXAMPLES
+
+ANSWERS = Path(__file__).parents[2] / "golden" / "mcu"
+#: Name, and the words behind `p2os mcu`: a program stands for its file, and `OUT/name` for a file that is written.
+VERBS = {
+    "info": "info dodge.elf --for 30ms",
+    "info-json": "info sensors.elf --json --for 30ms",
+    "coverage": "coverage sensors.elf --for 60ms --drive PA6=1@20ms --missed --lcov OUT/lcov",
+    "coverage-json": "coverage dodge.elf --for 30ms --json",
+    "profile": "profile dodge.elf --for 60ms --all --flame OUT/svg --folded OUT/folded",
+    "profile-json": "profile sensors.elf --for 30ms --json",
+    "trace": "trace sensors.elf --for 40us",
+    "trace-json": "trace dodge.elf --from 10ms --for 10050us --json",
+    "trace-calls": "trace sensors.elf --for 12ms --calls",
+    "pins": "pins sensors.elf --for 6ms --all --drive PA6=1@2ms --vcd OUT/vcd --sr OUT/sr",
+    "pins-json": "pins dodge.elf --for 6ms --json",
+    "parts": "parts",
+    "run-parts": f"run parts.elf --for 500ms --parts OUT/parts {' '.join(f'--attach {one}' for one in ATTACHED)}",
+    "run-usb": "run usb_echo.elf --for 400ms --usb OUT/serial",
+    "run-until": "run sensors.elf --for 5s --drive PA6=1@1ms --until 'usart1 matches on$' --itm OUT/itm --swo OUT/swo",
+    "run-volts": "run analog.elf --for 120ms --drive PA0=1.65V --drive PA4=z@50ms --usart-baud 9600",
+    "run-strict": "run analog.elf --for 120ms --strict",
+    "races": "races dodge.elf --for 20ms --runs 2 --drive PA0=1@5ms --send w\\n@10ms",
+    "compare-cores": "compare-cores sensors.elf --for 2ms --core python --drive PA6=1@1ms",
+    "compare-cores-json": "compare-cores dodge.elf --for 1ms --core exact --json",
+}  # fmt: skip
+
+
+def answer(words: str, folder: Path) -> str:
+    """Return what a verb answers: its exit code, both its outputs, and the files that it writes."""
+    said, told = (io.TextIOWrapper(io.BytesIO(), encoding="utf-8", write_through=True) for _ in range(2))
+    given = [_file(word) if word.endswith(".elf") else word.replace("OUT", str(folder)) for word in shlex.split(words)]
+    with contextlib.redirect_stdout(said), contextlib.redirect_stderr(told):
+        code = run(given)
+    outputs = [stream.buffer.getvalue().decode().replace("\r", "<CR>") for stream in (said, told)]
+    parts = [f"$ p2os mcu {words}: {code}\n{outputs[0]}", f"--- stderr\n{outputs[1]}"]
+    for path in sorted(each for each in folder.rglob("*") if each.is_file()):
+        name = path.relative_to(folder).as_posix()
+        if zipfile.is_zipfile(path):
+            with zipfile.ZipFile(path) as archive:
+                parts += [f"--- {name} {each}\n{_shown(archive.read(each))}" for each in archive.namelist()]
+        else:
+            parts.append(f"--- {name}\n{_shown(path.read_bytes())}")
+    whole = "\n".join(parts)
+    for place, stands in ((EXAMPLES, "EXAMPLES"), (PARTS.parent, "FIRMWARE"), (folder, "OUT")):
+        whole = whole.replace(str(place), stands)
+    return whole.rstrip() + "\n"
+
+
+def _file(name: str) -> str:
+    return str(PARTS if name == PARTS.name else EXAMPLES / name)
+
+
+def _shown(data: bytes) -> str:
+    """Return a text, or what stands for bytes that are none; of a picture, for what it has compressed."""
+    if data.startswith(b"\x89PNG"):
+        data = data[16:24] + zlib.decompress(data[41:-16])  # after IHDR and the head of IDAT, up to its CRC and IEND
+    with contextlib.suppress(UnicodeDecodeError):
+        if b"\0" not in data:
+            return data.decode().replace("\r", "<CR>")
+    return f"{len(data)} bytes, SHA-256 {hashlib.sha256(data).hexdigest()}"
+
+
+@pytest.mark.parametrize("name", VERBS)
+def test_a_verb_answers_as_it_did(name: str, tmp_path: Path) -> None:
+    assert answer(VERBS[name], tmp_path) == (ANSWERS / f"{name}.txt").read_text(encoding="utf-8")
+
+
+if __name__ == "__main__":
+    ANSWERS.mkdir(exist_ok=True)
+    for each, line in VERBS.items():
+        with tempfile.TemporaryDirectory() as place:
+            (ANSWERS / f"{each}.txt").write_text(answer(line, Path(place)), encoding="utf-8")
