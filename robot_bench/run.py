@@ -31,8 +31,8 @@ from robot_bench.bench import Bench, RobotRun, run_of
 from robot_bench.bench.board import pins_of
 from robot_bench.bench.recorded_variables import recording_variables, variables_of
 from robot_bench.events.codec import Json
-from robot_bench.recording.run_folder import remove_run, reserved
-from robot_bench.recording.run_record import TRACE_NAME, read_run
+from robot_bench.recording.run_folder import TRACE_NAME, remove_run, reserved
+from robot_bench.recording.run_record import read_run
 from robot_bench.recording.summary import INTERRUPTED, end_of_a_broken_run, outcome_of, outcome_of_all
 from robot_bench.recording.trace import TraceWriter
 from robot_bench.remote import RemoteBench

@@ -12,6 +12,9 @@ from enum import Enum
 
 #: Of the frames, the header and the subprotocol; another is refused.
 FORMAT = 1
+#: chosen: pixels that a whole run is asked for at first; more than any screen has, so that one may look closer at an
+#: eighth of it before rows are missed.
+WHOLE_PIXELS = 2400
 
 
 class CellType(Enum):

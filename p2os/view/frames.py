@@ -26,7 +26,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import IntFlag
 from itertools import pairwise
-from typing import TypeAlias, cast
+from typing import TypeAlias, cast, overload
 
 from p2os.errors import RemoteProtocolError
 from p2os.view.channels import BY_NUMBER, FORMAT, CellType, ChannelKind
@@ -72,8 +72,35 @@ class LaterText:
         return repr(str(self))
 
 
+class LaterTexts(Sequence[str]):
+    """A column of texts, each made when somebody is to read it.
+
+    Args:
+        count: Rows.
+        make: Returns the text of a row.
+    """
+
+    def __init__(self, count: int, make: Callable[[int], str]) -> None:
+        self._rows, self._make = range(count), make
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    @overload
+    def __getitem__(self, place: int) -> str: ...
+
+    @overload
+    def __getitem__(self, place: slice) -> list[str]: ...
+
+    def __getitem__(self, place: int | slice) -> str | list[str]:
+        """Return the text of a row, or those of some."""
+        if isinstance(place, slice):
+            return list(map(self._make, self._rows[place]))
+        return self._make(self._rows[place])
+
+
 #: One column: numbers as an array of its type, texts or bytes as a list.
-ColumnValues: TypeAlias = "array[int] | array[float] | list[str] | list[bytes]"
+ColumnValues: TypeAlias = "array[int] | array[float] | list[str] | list[bytes] | LaterTexts"
 
 
 class FrameError(RemoteProtocolError):
@@ -188,14 +215,44 @@ def frames_in(data: bytes) -> Iterator[ViewFrame]:
     Raises:
         FrameError: At one that is none.
     """
-    place = 0
-    while place < len(data):
-        size = int.from_bytes(data[place + _SIZE_AT : place + _SIZE_AT + 4], "little")
-        yield ViewFrame.from_bytes(data[place : place + max(size, HEAD.size)])
-        place += size
+    for packed in packed_frames(data):
+        yield packed.frame()
 
 
-_SIZE_AT = 24
+@dataclass(frozen=True, slots=True)
+class PackedFrame:
+    """A frame whose rows are read when they are asked for; what its head says is known."""
+
+    data: memoryview
+    kind_number: int
+    channel: int
+    from_ns: Nanos
+    to_ns: Nanos
+
+    def frame(self) -> ViewFrame:
+        """Return it with its rows.
+
+        Raises:
+            FrameError: It is none.
+        """
+        return ViewFrame.from_bytes(bytes(self.data))
+
+
+def packed_frames(data: "bytes | memoryview") -> Iterator[PackedFrame]:
+    """Yield frames that stand one behind the other, without a look at their rows.
+
+    Raises:
+        FrameError: At one that has no whole head, or ends behind the data.
+    """
+    left = memoryview(data)
+    while left:
+        if len(left) < HEAD.size:
+            raise FrameError(f"{len(left)} bytes, and a frame has {HEAD.size} at least")
+        _, _, kind, _, _, channel, _, _, _, size, _, from_ns, to_ns = HEAD.unpack_from(left)
+        if not HEAD.size <= size <= len(left):
+            raise FrameError(f"{len(left)} bytes, and the head says {size}")
+        yield PackedFrame(left[:size], kind, channel, from_ns, to_ns)
+        left = left[size:]
 
 
 def _packed(cells: CellType, values: ColumnValues) -> Iterator[bytes]:

@@ -5,8 +5,9 @@ and idle packets come again and again: each distinct one is explained once.
 """
 
 import json
-from collections.abc import Callable, Iterator
-from functools import partial
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
+from functools import cached_property, partial
 
 from p2os.capture import Chunk, Direction, FollowedReading, Lister, ListingRow, Reading, explain
 from p2os.capture.listing import frame_row, inside_of
@@ -33,8 +34,8 @@ class PacketRows:
     def __init__(self, robot: str = "") -> None:
         self.reading = FollowedReading(robot)
         self._lister = Lister(self.reading)
-        #: By bytes and name, as they are read now.
-        self._explained: dict[tuple[bytes, str], tuple[LaterText, LaterText]] = {}
+        #: By bytes, name and who has sent them, as they are read now.
+        self._explained: dict[tuple[bytes, str, Direction | None], tuple[LaterText, LaterText]] = {}
         self._read_by = self.reading.reading
 
     def take(self, chunk: Chunk) -> Iterator[tuple[PacketRow, ListingRow]]:
@@ -47,25 +48,11 @@ class PacketRows:
         for row in self._lister.finish(now):
             yield self._row(row), row
 
-    def texts_again(self, sender: int, data: bytes, name: str) -> tuple[LaterText, LaterText]:
-        """Return what a sound packet says, and its fields, once those before it were taken."""
-        if sender == _SENDERS[Direction.FROM_ROBOT]:
-            self.reading.take(data[PREFIX_BYTES:-CHECKSUM_BYTES])
-        if self.reading.reading is not self._read_by:
-            self._explained.clear()
-            self._read_by = self.reading.reading
-        key = data, name
-        if key not in self._explained:
-            row = partial(_row_again, sender, data, name, self._read_by)
-            says, inside = partial(_says_again, row), partial(_fields_again, row, self._read_by)
-            self._explained[key] = LaterText(says), LaterText(inside)
-        return self._explained[key]
-
     def _row(self, row: ListingRow) -> PacketRow:
         if len(self._explained) >= MOST_KEPT or self.reading.reading is not self._read_by:
             self._explained.clear()
             self._read_by = self.reading.reading
-        key = row.data, row.name
+        key = row.data, row.name, row.direction  # a robot echoes SYNC0 to SYNC2
         if key not in self._explained:
             made = LaterText(partial(inside_of, row)), LaterText(partial(_fields_of, row, self._read_by))
             self._explained[key] = made
@@ -73,16 +60,52 @@ class PacketRows:
         return row.at_ns, _SENDERS[row.direction], row.data, row.name, says, fields, int(not row.valid)
 
 
-def _row_again(sender: int, data: bytes, name: str, reading: Reading) -> ListingRow:
-    return frame_row(data, at_ns=0, direction=_DIRECTIONS[sender], name=name, reading=reading)
+class PacketTexts:
+    """What packets say that were kept without it: made again of their bytes.
 
+    Args:
+        robot: Model or file, as of `PacketRows`.
+        senders: Of each row, as its column has it.
+        data: Its bytes.
+        names: Its name.
+        are_bad: Whether it is no sound frame.
+    """
 
-def _says_again(row: Callable[[], ListingRow]) -> str:
-    return inside_of(row())
+    def __init__(
+        self, robot: str, senders: Sequence[int], data: Sequence[bytes], names: Sequence[str], are_bad: Sequence[int]
+    ) -> None:
+        self._robot, self._senders, self._data, self._names, self._are_bad = robot, senders, data, names, are_bad
 
+    def says(self, row: int) -> str:
+        """Return what a sound packet says."""
+        return inside_of(self._row(row))
 
-def _fields_again(row: Callable[[], ListingRow], reading: Reading) -> str:
-    return _fields_of(row(), reading)
+    def fields(self, row: int) -> str:
+        """Return its fields, as the column has them."""
+        return _fields_of(self._row(row), self._reading_at(row))
+
+    def _row(self, row: int) -> ListingRow:
+        direction = _DIRECTIONS[self._senders[row]]
+        return frame_row(
+            self._data[row], at_ns=0, direction=direction, name=self._names[row], reading=self._reading_at(row)
+        )
+
+    def _reading_at(self, row: int) -> Reading:
+        firsts, readings = self._readings
+        return readings[bisect_right(firsts, row) - 1]
+
+    @cached_property
+    def _readings(self) -> tuple[list[int], list[Reading]]:
+        """From which row on packets are read how: what a robot says of itself holds for its packet, too."""
+        followed, from_robot = FollowedReading(self._robot), _SENDERS[Direction.FROM_ROBOT]
+        firsts, readings = [0], [followed.reading]
+        for row, (sender, data, is_bad) in enumerate(zip(self._senders, self._data, self._are_bad, strict=True)):
+            if sender == from_robot and not is_bad:
+                followed.take(data[PREFIX_BYTES:-CHECKSUM_BYTES])
+                if followed.reading is not readings[-1]:
+                    firsts.append(row)
+                    readings.append(followed.reading)
+        return firsts, readings
 
 
 def _fields_of(row: ListingRow, reading: Reading) -> str:

@@ -18,12 +18,11 @@ from dataclasses import replace
 from functools import cache
 from importlib.resources import files
 
+from p2os.view.channels import WHOLE_PIXELS
 from p2os.view.frames import ViewFrame
 from p2os.view.header import PageHeader
 from p2os.view.recording import ViewRecording
 
-#: chosen: more than any screen has, so that one may look closer at an eighth of the run before rows are missed.
-PIXELS = 2400
 #: chosen: rows of each list; half a megabyte of packets, packed.
 LISTED = 5000
 #: Files of the bundle; the last one is for who looks into the package.
@@ -43,7 +42,7 @@ def page_of(recording: ViewRecording, *, all_is_in: str = "") -> str:
         recording: What it shows.
         all_is_in: Where the rest is, for the lines on what is left out; empty: nowhere.
     """
-    frames = list(recording.frames(PIXELS, LISTED))
+    frames = list(recording.frames(WHOLE_PIXELS, LISTED))
     header = recording.full_header
     return document(replace(header, left_out=(*header.left_out, *left_out(header, frames, all_is_in))), frames)
 

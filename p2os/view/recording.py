@@ -10,9 +10,19 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, cast
 
-from p2os.view.channels import BY_NAME, CellType, ChannelKind
+from p2os.view.channels import BY_NAME, WHOLE_PIXELS, CellType, ChannelKind
 from p2os.view.detail import ROWS_A_PIXEL, Extremes, changes, curve, nearest, rows_in, thinned_list
-from p2os.view.frames import NO_FLAGS, ColumnValues, FrameFlags, LaterText, ViewFrame, chosen_rows, empty_columns
+from p2os.view.frames import (
+    NO_FLAGS,
+    ColumnValues,
+    FrameFlags,
+    LaterText,
+    LaterTexts,
+    PackedFrame,
+    ViewFrame,
+    chosen_rows,
+    empty_columns,
+)
 from p2os.view.header import ChannelHeader, PageHeader
 from simbase.timing import Nanos
 
@@ -38,6 +48,8 @@ class ChannelTrack:
         self.kind: ChannelKind = BY_NAME[header.kind]
         #: Adds the rows when somebody is to see them; None: they are there.
         self.later: Callable[[], None] | None = None
+        #: Rows of the whole time on `WHOLE_PIXELS`, as they were packed before; None: they are when asked for.
+        self.packed_whole: PackedFrame | None = None
         #: Counts how often its rows were made anew: who has sent some sends all again.
         self.generation = 0
         self._take(empty_columns(self.kind))
@@ -68,23 +80,27 @@ class ChannelTrack:
 
     def _take(self, columns: list[ColumnValues]) -> None:
         self._columns, self._times = columns, cast("array[int]", columns[0])
-        #: What adds a cell to each column but the first: of the column's type, as the caller has it.
-        self._adders: list[Callable[[Any], None]] = [
-            cast("array[float]", values).extend if column.is_wide else values.append
-            for values, column in zip(columns[1:], self.kind.columns[1:], strict=True)
+        self._adders: list[Callable[[Any], None]] = []
+
+    def _find_adders(self) -> list[Callable[[Any], None]]:
+        """Return what adds a cell to each column but the first: of the column's type, as the caller has it."""
+        self._adders = [
+            cast("array[float]", values).extend if column.is_wide else cast("list[str]", values).append
+            for values, column in zip(self._columns[1:], self.kind.columns[1:], strict=True)
         ]
+        return self._adders
 
     def append(self, t_ns: Nanos, *cells: Cell) -> None:
         """Add a row; a time that steps back is moved up."""
         times = self._times
         times.append(times[-1] if times and times[-1] > t_ns else t_ns)
-        for add, cell in zip(self._adders, cells, strict=True):
+        for add, cell in zip(self._adders or self._find_adders(), cells, strict=True):
             add(cell)
 
     def replace_rows(self, first: int, last: int, columns: Sequence[ColumnValues]) -> None:
         """Put other rows where those from one to before another are; none but the kinds of plain columns."""
         for values, new in zip(self.columns, columns, strict=True):
-            values[first:last] = new  # type: ignore[assignment]  # of one type, as its kind has it
+            values[first:last] = new  # type: ignore[assignment,index]  # of one type, as its kind has it
         self.generation += 1
         self._indices.clear()
 
@@ -102,7 +118,7 @@ class ChannelTrack:
 
     def take_columns(self, columns: Iterable[ColumnValues]) -> None:
         """Take rows as a frame has them, before any of its own."""
-        self._take([values if isinstance(values, array) else list(values) for values in columns])  # type: ignore[misc]  # of one type, as its kind has it
+        self._take([values if isinstance(values, (array, LaterTexts)) else list(values) for values in columns])  # type: ignore[misc]  # of one type, as its kind has it
 
     def column(self, name: str) -> ColumnValues:
         """Return a column by its name."""
@@ -124,6 +140,13 @@ class ChannelTrack:
         if last - first <= ROWS_A_PIXEL * pixels and self.kind.name not in _SEVERITY:
             return self._frame(self.rows(first, last), from_ns, to_ns, last - first, flags)
         return self._frame(self._thinned(first, last, pixels, listed), from_ns, to_ns, last - first, flags)
+
+    def packed(self, from_ns: Nanos, to_ns: Nanos, pixels: int) -> bytes | memoryview:
+        """Return a frame's bytes, as of `frame`: of the whole time those that were packed before, where there are."""
+        whole = self.packed_whole
+        if whole is not None and (from_ns, to_ns, pixels) == (whole.from_ns, whole.to_ns, WHOLE_PIXELS):
+            return whole.data
+        return self.frame(from_ns, to_ns, pixels).to_bytes()
 
     def tail(self, first: int, last: int) -> ViewFrame:
         """Return the rows from one to before another, all of them."""

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, cast
 
-from p2os.view.capture_recording import open_recording
 from p2os.view.header import PageSection, PanelHeader
 from p2os.view.live import ShownSource, StillRecording
 from simbase.entry_points import installed_points
@@ -92,6 +91,8 @@ def capture_target(named: str) -> ViewTarget | None:
     path = Path(named)
     if not path.is_file() or path.suffix == ".toml":
         return None
+    from p2os.view.capture_recording import open_recording  # reads packets: of no run that was kept
+
     recording = open_recording(path)
     if not recording.tracks:
         raise FileError(f"{named} holds no bytes of a P2OS line")

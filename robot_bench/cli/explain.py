@@ -22,7 +22,8 @@ from robot_bench.campaign.whole import points_of
 from robot_bench.campaign.workers.processes import Processes
 from robot_bench.cli.progress import RunDisplay, counting_bar
 from robot_bench.events.codec import events_of
-from robot_bench.recording.run_record import TRACE_NAME, RunRecord, read_run, record_of
+from robot_bench.recording.run_folder import TRACE_NAME
+from robot_bench.recording.run_record import RunRecord, read_run, record_of
 from robot_bench.recording.together import robots_in
 from robot_bench.report.explain.chain import Explanation, Standing
 from robot_bench.report.explain.explain import explain as explain_run

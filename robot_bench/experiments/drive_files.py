@@ -21,7 +21,8 @@ from robot_bench.drives.drive import Drive, Floats, Trajectory, heading_of, numb
 from robot_bench.drives.of_packets import drive_of_capture
 from robot_bench.drives.of_run import DEFAULT_ROBOT, drive_of_record
 from robot_bench.experiments.aria_logs import is_aria_log, read_aria_log
-from robot_bench.recording.run_record import TRACE_NAME, read_events, read_run
+from robot_bench.recording.run_folder import TRACE_NAME
+from robot_bench.recording.run_record import read_events, read_run
 from simbase.entry_points import installed_points
 from simbase.errors import FileError, shown_name
 from simbase.files import lines_of, reading, writing

@@ -17,14 +17,17 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from robot_bench.recording.run_record import TRACE_NAME
-from robot_bench.recording.summary import SUMMARY_NAME
-from robot_bench.recording.variables import VARIABLES_NAME
 from simbase.errors import UsageError
 from simbase.files import reason_of, refuse_elsewhere
 
 #: Where run folders go by default, in the current directory.
 RUNS = Path("runs")
+#: What happened, an event a line: the record of the run.
+TRACE_NAME = "trace.jsonl"
+#: Values of the variables that were watched.
+VARIABLES_NAME = "variables.jsonl"
+#: How it came out.
+SUMMARY_NAME = "summary.json"
 #: What was done by hand in a run, as a scenario that is that run without a page.
 HANDS_NAME = "hands.toml"
 #: A long run as its page shows it (`robot_bench.view.kept_recording`).

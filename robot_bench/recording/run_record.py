@@ -47,12 +47,11 @@ from robot_bench.events.kinds import (
     WorldChange,
 )
 from robot_bench.events.whole_lines import check_whole_line
+from robot_bench.recording.run_folder import TRACE_NAME
 from robot_bench.recording.variables import VariableRecord, read_variables
 from robot_bench.wires.edges import Edges
 from simbase.files import lines_of
 from simbase.timing import NS_PER_S
-
-TRACE_NAME = "trace.jsonl"
 
 
 @dataclass(slots=True, kw_only=True, repr=False)

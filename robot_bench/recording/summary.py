@@ -15,6 +15,7 @@ from typing import cast
 from robot_bench.events.codec import Json
 from robot_bench.events.kinds import Wave
 from robot_bench.recording.disputed import body_note
+from robot_bench.recording.run_folder import SUMMARY_NAME
 from robot_bench.recording.run_record import RunRecord
 from simbase.timing import NS_PER_S
 
@@ -22,7 +23,6 @@ from simbase.timing import NS_PER_S
 CELL_M = 0.5
 #: chosen: so many collisions are listed in the table; all stand in the state log.
 LISTED_HITS = 5
-SUMMARY_NAME = "summary.json"
 #: How the first failure of a run begins that a signal ended.
 INTERRUPTED = "interrupted"
 

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import cast
 
 from robot_bench.events.kinds import Event
-from robot_bench.recording.run_record import TRACE_NAME, read_events, read_meta
-from robot_bench.recording.summary import SUMMARY_NAME
+from robot_bench.recording.run_folder import SUMMARY_NAME, TRACE_NAME
+from robot_bench.recording.run_record import read_events, read_meta
 from simbase.errors import FileError
 from simbase.files import read_text
 from simbase.timing import Nanos

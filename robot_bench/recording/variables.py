@@ -18,10 +18,10 @@ from typing import Self, cast
 
 from bluepill_sim.program.variables import Variable
 from robot_bench.events.codec import LAST_NS, Json, TraceError, damaged, entries_of
+from robot_bench.recording.run_folder import VARIABLES_NAME
 from simbase.files import lines_of, open_to_write_text
 from simbase.timing import Nanos
 
-VARIABLES_NAME = "variables.jsonl"
 VERSION = 1
 #: chosen: rows of a line; what a run that is cut loses of each variable.
 MOST_ROWS = 500

@@ -24,7 +24,8 @@ from types import ModuleType
 
 from p2os.view.page import page_of
 from robot_bench.events.codec import Json
-from robot_bench.recording.run_record import TRACE_NAME, RunRecord, read_run
+from robot_bench.recording.run_folder import TRACE_NAME
+from robot_bench.recording.run_record import RunRecord, read_run
 from robot_bench.recording.summary import outcome_of_all, write_outcome
 from robot_bench.recording.waveforms import write_sigrok, write_vcd
 from robot_bench.report.drawn import drawn_of

@@ -14,8 +14,9 @@ from p2os.view.header import PageCell, PageHeader, PageSection, PageTable, Stand
 from p2os.view.page import page_of
 from p2os.view.recording import ViewRecording
 from robot_bench.events.codec import Json
-from robot_bench.recording.run_record import TRACE_NAME, RunRecord
-from robot_bench.recording.summary import SUMMARY_NAME, verdict_of
+from robot_bench.recording.run_folder import SUMMARY_NAME, TRACE_NAME
+from robot_bench.recording.run_record import RunRecord
+from robot_bench.recording.summary import verdict_of
 from robot_bench.view.run_recording import recording_of_all, standing_of
 from simbase.files import writing
 

@@ -11,7 +11,8 @@ from p2os.view.header import PageBlock, PageCell, PageList, PagePicture, PageSec
 from p2os.view.page import page_of
 from p2os.view.recording import ViewRecording
 from robot_bench.events.codec import Json
-from robot_bench.recording.run_record import TRACE_NAME, RunRecord
+from robot_bench.recording.run_folder import TRACE_NAME
+from robot_bench.recording.run_record import RunRecord
 from robot_bench.recording.summary import EXPLAINED, MEASURED, figures
 from robot_bench.view.program_sections import program_panel_of
 from robot_bench.view.run_recording import recording_of

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from robot_bench.events.codec import events_of
 from robot_bench.events.kinds import Note
-from robot_bench.recording.run_record import TRACE_NAME
+from robot_bench.recording.run_folder import TRACE_NAME
 from robot_bench.ros.bench_node import SET_PIN, WHO
 from robot_bench.scenario.hands.actions import LEVELS, Action
 from simbase.errors import FileError, shown_name

@@ -32,6 +32,7 @@ def _numbers() -> list[str]:
     flags = ", ".join(f"{flag.name}: {flag.value}" for flag in FrameFlags)
     return [
         f"export const FORMAT = {channels.FORMAT};",
+        f"export const WHOLE_PIXELS = {channels.WHOLE_PIXELS};",
         f"export const FLAGS = {{ {flags} }} as const;",
         "export type Cells = " + " | ".join(f'"{cells.value}"' for cells in CellType) + ";",
         _plain_interface("ColumnKind", name="string", cells="Cells", isWide="boolean"),

@@ -15,7 +15,7 @@ from p2os.cli.links.link_quality import LinkQuality
 from p2os.cli.names import ReportedModel, RobotUrl
 from p2os.cli.quantities import option
 from p2os.cli.robots.dashboard import Dashboard, draw, line_of
-from p2os.cli.robots.viewed_robot import opened_for
+from p2os.cli.robots.robot_page import opened_for
 from p2os.client import Connected, GaveUp, LinkLost, Notice, PacketArrived, Robot, RobotState
 from p2os.client.notices import words_of
 from p2os.transport.wall_clock import wall_clock

@@ -33,7 +33,7 @@ from p2os.cli.names import ReportedModel, RobotUrl
 from p2os.cli.quantities import option
 from p2os.cli.robots.pad_source import SdlPad
 from p2os.cli.robots.page_stop import PageStop
-from p2os.cli.robots.viewed_robot import opened_for
+from p2os.cli.robots.robot_page import opened_for
 from p2os.client import Link, Robot
 from p2os.client.notices import DeadmanStopped, GapStopped, LinkLostError, Notice
 from p2os.gamepad import PAD_MPS, PAD_RADPS, STICK_FULL, TRIGGER_FULL, Gamepad, PadReport

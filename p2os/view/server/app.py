@@ -156,13 +156,13 @@ class _PageConnection:
                 await self._send(self._session.news())
             await asyncio.sleep(NEWS_S)
 
-    async def _send(self, messages: Iterable[str | bytes]) -> None:
+    async def _send(self, messages: Iterable[str | bytes | memoryview]) -> None:
         for message in messages:
             async with asyncio.timeout(SLOWEST_SEND_S):
-                if isinstance(message, bytes):
-                    await self._socket.send_bytes(message)
-                else:
+                if isinstance(message, str):
                     await self._socket.send_text(message)
+                else:
+                    await self._socket.send_bytes(bytes(message))
 
 
 def _plain(text: str, status: int) -> Response:

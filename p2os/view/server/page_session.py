@@ -15,6 +15,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, fields, replace
 from typing import cast
 
+from p2os.view.channels import WHOLE_PIXELS
 from p2os.view.frames import FrameFlags
 from p2os.view.header import Answered, PageHeader, PanelState, Wanted
 from p2os.view.live import ShownSource
@@ -27,8 +28,8 @@ LARGEST_REQUEST_BYTES = 65_536
 MOST_CHANNELS, MOST_PIXELS = 4096, 8192
 #: chosen: more panels than a screen has room for.
 MOST_PANELS = 6
-#: The end of rows that go on, as the page has it; and as many pixels as a channel is sent for that was made anew.
-OPEN_END_NS, REPLACED_PIXELS = 2**62, 2000
+#: The end of rows that go on, as the page has it.
+OPEN_END_NS = 2**62
 #: chosen: new rows of a channel that are sent at once.
 MOST_NEWS = 20_000
 #: chosen: a page asks some ten times a second while one drags; so many in a row, and so many a second.
@@ -73,7 +74,7 @@ class PageSession:
     def _recording(self) -> ViewRecording:
         return self._source.recording
 
-    def news(self) -> Iterator[str | bytes]:
+    def news(self) -> Iterator[str | bytes | memoryview]:
         """Yield what has changed since the last call: the header, new rows, the time; at the first call the header."""
         control = self._source.control
         # As it stood before: the rows that it is about are there then.
@@ -86,7 +87,7 @@ class PageSession:
             end = len(track)
             if track.generation != self._generations.get(channel, 0):
                 self._generations[channel] = track.generation
-                yield track.frame(0, OPEN_END_NS, REPLACED_PIXELS, flags=FrameFlags.REPLACES).to_bytes()
+                yield track.frame(0, OPEN_END_NS, WHOLE_PIXELS, flags=FrameFlags.REPLACES).to_bytes()
             elif end - row > MOST_NEWS:
                 lost += end - row
             elif end > row:
@@ -120,7 +121,7 @@ class PageSession:
             self._is_driving = False
             control.offer(RunCommand(do="drive"))
 
-    def receive(self, text: str, now_s: float) -> Iterator[str | bytes]:
+    def receive(self, text: str, now_s: float) -> Iterator[str | bytes | memoryview]:
         """Yield the answer to a request.
 
         Args:
@@ -151,7 +152,7 @@ class PageSession:
             return
         for channel in dict.fromkeys(wanted.want):
             track = self._recording.tracks[channel]
-            yield track.frame(wanted.from_ns, wanted.to_ns, wanted.pixels).to_bytes()
+            yield track.packed(wanted.from_ns, wanted.to_ns, wanted.pixels)
             if self._recording.header.is_live:
                 self._sent[channel], self._generations[channel] = len(track), track.generation
         yield _said(done=wanted.id)

@@ -16,8 +16,7 @@ from robot_bench.campaign.variants.shrinking.kept import Kept, keep, trial_of_ru
 from robot_bench.campaign.variants.shrinking.shrink import BUDGET, Shrunk, shrink
 from robot_bench.cli.names import scenario_names
 from robot_bench.cli.progress import RunDisplay, runs_bar
-from robot_bench.recording.run_folder import make_next_folder
-from robot_bench.recording.run_record import TRACE_NAME
+from robot_bench.recording.run_folder import TRACE_NAME, make_next_folder
 from robot_bench.scenario.included_files import Setting, read_setting
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_S, Nanos

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from p2os.view.live import StillRecording
 from p2os.view.targets import ViewTarget
-from robot_bench.recording.run_record import TRACE_NAME
+from robot_bench.recording.run_folder import TRACE_NAME
 from robot_bench.view.kept_recording import is_long, keep, kept
 
 if TYPE_CHECKING:

@@ -12,8 +12,9 @@ from p2os.cli.main import run as p2os
 from robot_bench.bench.recorded_variables import variables_of
 from robot_bench.cli.shown.targets import run_target
 from robot_bench.events.codec import TraceError
+from robot_bench.recording.run_folder import VARIABLES_NAME
 from robot_bench.recording.run_record import read_run
-from robot_bench.recording.variables import MOST_ROWS, VARIABLES_NAME, VariableWriter, read_variables
+from robot_bench.recording.variables import MOST_ROWS, VariableWriter, read_variables
 from robot_bench.report.make import Files
 from robot_bench.run import run_scenario
 from robot_bench.scenario.loading import load_scenario

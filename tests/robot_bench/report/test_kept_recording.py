@@ -1,11 +1,14 @@
 """A long run that was kept beside its trace: shown as its trace shows it, or not at all."""
 
+import ast
 import json
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from p2os.view.channels import WHOLE_PIXELS
 from p2os.view.header import (
     PageBlock,
     PageCell,
@@ -24,7 +27,7 @@ from p2os.view.header import (
     WorldHeader,
     WorldThing,
 )
-from p2os.view.recording import ViewRecording
+from p2os.view.recording import ChannelTrack, ViewRecording
 from robot_bench.cli.shown.targets import run_target
 from robot_bench.recording.run_folder import KEPT_NAME
 from robot_bench.recording.run_record import read_run
@@ -33,6 +36,7 @@ from robot_bench.run import run_scenario
 from robot_bench.scenario.loading import load_scenario
 from robot_bench.view.kept_recording import LEAST_BYTES, is_long, keep, kept
 
+ROOT = Path(__file__).resolve().parents[3]
 FENCE = WorldThing(name="k", kind="wall", shape="polygon", x_m=0.0, y_m=0.0, points=((0.0, 1.0), (2.0, 3.0)))
 BLOCKS: list[PageBlock] = [
     PageTable(title="t", head=("a", "b"), rows=[[PageCell(text="1", is_number=True, at_ns=5)]]),
@@ -71,6 +75,62 @@ def test_what_is_kept_of_a_run_is_what_its_trace_shows(folder: Path) -> None:
     assert target is not None
     assert target.run is None
     assert target.source.recording.header == found.header
+
+
+def test_what_a_page_shows_first_is_sent_as_it_was_packed_and_all_else_is_made(folder: Path) -> None:
+    whole = run_report(read_run(folder))
+    keep(whole, folder)
+    found = kept(folder)
+    assert found is not None
+    start, end = whole.header.start_ns, whole.header.end_ns
+    for track, same in zip(found.tracks, whole.tracks, strict=True):
+        assert bytes(track.packed(start, end, WHOLE_PIXELS)) == same.packed(start, end, WHOLE_PIXELS)
+        assert track.later is not None  # its rows were not read for it
+        for other in ((start, end, WHOLE_PIXELS - 1), (start, end - 1, WHOLE_PIXELS), (start + 1, end, WHOLE_PIXELS)):
+            assert track.packed(*other) == same.packed(*other)
+        assert track.later is None
+
+
+def test_frames_of_other_channels_are_not_shown(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = run_report(read_run(folder))
+    kinds = [track.kind.name for track in whole.tracks]
+    other = whole.tracks[next(n for n, kind in enumerate(kinds) if kind != kinds[0])].frame(0, 1, 1)
+    monkeypatch.setattr(ChannelTrack, "frame", lambda *_: other)
+    keep(whole, folder)
+    assert kept(folder) is None
+
+
+#: What `p2os view` loads for a run that was kept, and what takes so long that it may not be among it.
+LOADED = (
+    "p2os.cli.captures.view", "p2os.cli.robots.viewed_robot", "robot_bench.cli.shown.targets",
+    "p2os.view.server.serving",
+)  # fmt: skip
+HEAVY = ("bluepill_sim", "p2os.capture", "p2os.client", "p2os.pioneer", "robot_bench.events")
+
+
+def loaded_with(names: Iterable[str]) -> set[str]:
+    """Return the modules of the project that are loaded with some, by what stands outside of functions."""
+    found: set[str] = set()
+    waiting = [*names]
+    while waiting:
+        name = waiting.pop()
+        spec = None if name in found else ROOT.joinpath(*name.split("."))
+        files = (
+            [] if spec is None else [one for one in (spec.with_suffix(".py"), spec / "__init__.py") if one.is_file()]
+        )
+        if files:
+            found.add(name)
+            waiting.append(name.rpartition(".")[0] or name)
+            for node in ast.parse(files[0].read_text()).body:
+                if isinstance(node, ast.ImportFrom) and node.module:
+                    waiting += [node.module, *(f"{node.module}.{one.name}" for one in node.names)]
+    return found
+
+
+def test_a_run_that_was_kept_opens_without_bench_emulator_and_client() -> None:
+    found = loaded_with(LOADED)
+    assert {*LOADED, "robot_bench.view.kept_recording", "p2os.view.recording"} <= found
+    assert [name for name in sorted(found) if name.startswith(HEAVY)] == []
 
 
 @pytest.mark.parametrize("what", ["byte", "end", "trace", "version", "head"])

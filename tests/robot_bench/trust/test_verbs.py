@@ -16,8 +16,8 @@ from p2os.cli.main import run as p2os
 from p2os.toml_file import toml_text
 from robot_bench.campaign.trial import TrialVerdict, run_trial, trial_of
 from robot_bench.campaign.variants.shrinking.kept import trial_of_run
-from robot_bench.recording.run_folder import make_next_folder
-from robot_bench.recording.run_record import TRACE_NAME, read_run
+from robot_bench.recording.run_folder import TRACE_NAME, make_next_folder
+from robot_bench.recording.run_record import read_run
 from robot_bench.run import run_scenario
 from robot_bench.scenario.loading import load_scenario
 from simbase.errors import FileError, UsageError

@@ -26,7 +26,8 @@ from p2os.toml_record import number_of, table_of
 from robot_bench.campaign.trial import Outcome, Trial, TrialVerdict, run_trial, trial_of
 from robot_bench.campaign.variants.shrinking.failure import FailureMode
 from robot_bench.campaign.variants.shrinking.things import WORLD_NAME
-from robot_bench.recording.run_record import TRACE_NAME, RunRecord, read_run
+from robot_bench.recording.run_folder import TRACE_NAME
+from robot_bench.recording.run_record import RunRecord, read_run
 from robot_bench.report import make_scene
 from robot_bench.report.explain.explain import explain
 from simbase.errors import FileError, P2osError, UsageError

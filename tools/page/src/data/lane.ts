@@ -9,6 +9,8 @@ const MOST_PIECES = 8;
 const MOST_GROWN = 60_000;
 /** How much wider what was asked for may be than the window that it serves. */
 export const RESERVE = 4;
+/** Rows for so much fewer pixels still show a window well. */
+export const LEAST_SHARE = 0.6;
 /** The end of what is asked for of a run that goes on: further than any. */
 export const OPEN_END_NS = 2 ** 62;
 
@@ -72,7 +74,7 @@ export class Lane {
 /** Whether a request has what a window on so many pixels needs. */
 export function serves(asked: Answer, from: number, to: number, pixels: number, end: number): boolean {
   const width = Math.max(1, Math.min(asked.to, end) - asked.from);
-  return asked.from <= from && asked.to >= to && (asked.pixels / width) * Math.max(1, to - from) >= pixels * 0.6 && width <= Math.max(1, to - from) * RESERVE;
+  return asked.from <= from && asked.to >= to && (asked.pixels / width) * Math.max(1, to - from) >= pixels * LEAST_SHARE && width <= Math.max(1, to - from) * RESERVE;
 }
 
 const within = (inner: Frame, outer: Frame) => inner.from >= outer.from && inner.to <= outer.to;

@@ -1,8 +1,8 @@
 // All that the page knows of a run: its header, and of each channel what was sent so far. Views read from here and say what they need.
 import { computed, type ReadonlySignal, signal, type Signal } from "@preact/signals";
-import type { ChannelHeader, HandsOffer, PageHeader, PanelState, RunCommand, RunState, Wanted } from "../generated/view";
+import { WHOLE_PIXELS, type ChannelHeader, type HandsOffer, type PageHeader, type PanelState, type RunCommand, type RunState, type Wanted } from "../generated/view";
 import type { Frame } from "./frames";
-import { Lane, OPEN_END_NS, serves } from "./lane";
+import { Lane, LEAST_SHARE, OPEN_END_NS, serves } from "./lane";
 
 export type Request = Omit<Wanted, "id">;
 
@@ -35,8 +35,8 @@ const OF_ALL: ReadonlySet<string> = new Set(["pose", "ranges", "things"]);
 const GATHERED_MS = 40;
 /** How long rows that come are gathered before they are shown, ms: less than two pictures of a screen. */
 const SHOWN_MS = 30;
-/** Pixels that a whole run is asked for. */
-const WHOLE_PIXELS = 2000;
+/** So many times finer than it is shown is asked for: a look a little closer needs no new rows. */
+const SPARE = 2.5;
 /** The most that the server takes. */
 const MOST_PIXELS = 8192;
 
@@ -165,7 +165,7 @@ export class Store {
   /** Rows over the whole run, as fine as there are. */
   whole(id: number): Frame | undefined {
     const { start_ns, end_ns } = this.header.peek();
-    return this.rows(id, start_ns, end_ns, WHOLE_PIXELS);
+    return this.rows(id, start_ns, end_ns, WHOLE_PIXELS / SPARE);
   }
 
   /** Rows of a time as they are, when they came; reduced where even so there are too many, undefined where nobody answers. */
@@ -197,7 +197,7 @@ export class Store {
       found.ids.add(id);
       found.pixels = Math.max(found.pixels, pixels);
     } else this.gathered.set(key, { ids: new Set([id]), from, to, pixels });
-    this.timer ??= setTimeout(() => this.flush(), GATHERED_MS);
+    this.timer ??= setTimeout(() => this.flush(), this.version.peek() ? GATHERED_MS : 0); // at first all views begin at once
   }
 
   private flush(): void {
@@ -209,7 +209,8 @@ export class Store {
   private ask(want: readonly number[], from: number, to: number, pixels: number): void {
     const { start_ns, end_ns, is_live } = this.header.peek(), edge = (to - from) * 0.75; // so that a short way to the side needs no new rows
     const end = to + edge >= end_ns && is_live ? OPEN_END_NS : Math.ceil(Math.min(end_ns, to + edge));
-    const request: Request = { want, from_ns: Math.floor(Math.max(start_ns, from - edge)), to_ns: end, pixels: Math.ceil(Math.min(MOST_PIXELS, 2.5 * pixels)) };
+    const isWhole = from <= start_ns && to >= end_ns && pixels * LEAST_SHARE <= WHOLE_PIXELS; // that is the one which a server has ready
+    const request: Request = { want, from_ns: Math.floor(Math.max(start_ns, from - edge)), to_ns: end, pixels: isWhole ? WHOLE_PIXELS : Math.ceil(Math.min(MOST_PIXELS, SPARE * pixels)) };
     this.open.push(request);
     this.source!.ask(request, (isThere) => {
       const place = this.open.indexOf(request);

@@ -1,6 +1,7 @@
 // Made by tools/generators/page_types.py of channels.py, header.py, run_control.py (p2os/view): do not edit.
 
 export const FORMAT = 1;
+export const WHOLE_PIXELS = 2400;
 export const FLAGS = { REDUCED: 1, REPLACES: 2 } as const;
 export type Cells = "i64" | "f64" | "f32" | "u32" | "u8" | "text" | "bytes";
 export interface ColumnKind {

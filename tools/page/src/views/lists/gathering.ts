@@ -7,6 +7,9 @@ import type { ChannelHeader } from "../../generated/view";
 import type { App } from "../../shell/app";
 import type { Clock } from "../../time/clock";
 
+/** A list has as many rows whatever the pixels. */
+const LISTED_PIXELS = 1000;
+
 export interface Item {
   readonly channel: ChannelHeader;
   readonly frame: Frame;
@@ -25,7 +28,7 @@ export function gathered(store: Store, channels: readonly ChannelHeader[], from:
   const items: Item[] = [];
   let of = 0;
   for (const channel of channels) {
-    const whole = store.whole(channel.id), frame = whole?.isReduced && store.canAsk ? (store.rows(channel.id, from, to, 4000) ?? whole) : whole;
+    const whole = store.whole(channel.id), frame = whole?.isReduced && store.canAsk ? (store.rows(channel.id, from, to, LISTED_PIXELS) ?? whole) : whole;
     if (!frame) continue;
     of += Math.max(whole?.of ?? 0, frame.of);
     for (let row = 0; row < frame.count; row++) items.push({ channel, frame, row, t: frame.t[row]! });
