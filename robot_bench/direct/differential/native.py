@@ -18,7 +18,7 @@ _FUNCTIONS = {
     "bridge_pass": "ipszll",
     "drive_begin": "vpppp",
     "drive_end": "vpddddd",
-    "encoder_turn": "zpdllzppp",
+    "encoder_turn": "zpdll",
     "train_aim": "vppddp",
     "train_step": "vpppd",
     "train_supply_v": "dpppddd",
@@ -65,11 +65,13 @@ class BatteryStruct(ctypes.Structure):
 
 
 class EncoderStruct(ctypes.Structure):
-    """An encoder and its state."""
+    """An encoder, its state, and where it writes the edges of a step."""
 
     _fields_ = [  # as above
         *_numbers(ctypes.c_double, "edges_per_rad", "angle"),
-        ("codes", ctypes.c_uint8 * 2),
+        ("level_codes", ctypes.c_uint8 * 2),
+        *_numbers(ctypes.c_size_t, "room", "of_a", "of_b"),
+        *_numbers(ctypes.c_void_p, "times", "codes"),
     ]
 
 

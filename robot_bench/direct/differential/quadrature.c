@@ -9,7 +9,11 @@ struct encoder {
     /* In edges since the start. */
     double angle;
     /* The codes of a low and a high level. */
-    uint8_t codes[2];
+    uint8_t level_codes[2];
+    /* Of a step: how many edges of each channel there is room for, how many there are, and these. */
+    size_t room, counts[CHANNELS];
+    int64_t *times;
+    uint8_t *codes;
 };
 
 /* The levels of A (bit 0) and B in the four quarters of a line. */
@@ -29,17 +33,16 @@ static int64_t nearest(double value)
     return whole + (rest > 0.5 || (rest == 0.5 && whole % 2 != 0));
 }
 
-/* Turn to an angle within a span from `begin` on; write each channel's edges, `room` of each at the most.
+/* Turn to an angle within a span from `begin` on, and write the edges of each channel.
 
-   Returns how many there are of both; where that is more than `room`, nothing is done. */
-size_t encoder_turn(struct encoder *encoder, double angle_rad, int64_t begin, int64_t span_ns, size_t room,
-                    int64_t *times, uint8_t *codes, size_t *counts)
+   Returns how many there are of both; where that is more than there is room for, nothing is done. */
+size_t encoder_turn(struct encoder *encoder, double angle_rad, int64_t begin, int64_t span_ns)
 {
     double before = encoder->angle, after = angle_rad * encoder->edges_per_rad;
     int64_t first = whole_below(before), last = whole_below(after);
     size_t edges = (size_t)(last > first ? last - first : first - last);
-    counts[0] = counts[1] = 0;
-    if (edges > room)
+    encoder->counts[0] = encoder->counts[1] = 0;
+    if (edges > encoder->room)
         return edges;
     encoder->angle = after;
     double way = after - before;
@@ -49,9 +52,9 @@ size_t encoder_turn(struct encoder *encoder, double angle_rad, int64_t begin, in
         size_t channel = edge & 1 ? 0 : 1;
         unsigned behind = LEVELS[(step > 0 ? edge : edge - 1) & (QUARTERS - 1)];
         int64_t at = nearest(((double)edge - before) / way * (double)span_ns);
-        size_t place = channel * room + counts[channel]++;
-        times[place] = begin + (at < 1 ? 1 : at > span_ns ? span_ns : at);
-        codes[place] = encoder->codes[behind >> channel & 1];
+        size_t place = channel * encoder->room + encoder->counts[channel]++;
+        encoder->times[place] = begin + (at < 1 ? 1 : at > span_ns ? span_ns : at);
+        encoder->codes[place] = encoder->level_codes[behind >> channel & 1];
     }
     return edges;
 }

@@ -35,13 +35,13 @@ class Quadrature(Stateful):
 
     STATE = ("_angle",)
     #: What a step has written is read at once.
-    DERIVED = ("_room", "_times", "_codes", "_counts")
+    DERIVED = ("_times", "_codes")
 
     def __init__(self, a: Net, b: Net, edges_per_turn: float) -> None:
         self._nets = (a, b)
         self._struct = EncoderStruct(edges_per_turn / (2 * math.pi), 0.0, _CODES)
         self._address = ctypes.addressof(self._struct)
-        self._counts = (ctypes.c_size_t * 2)()
+        self._turn = functions().encoder_turn
         self._make_room(_ROOM)
 
     @property
@@ -60,23 +60,21 @@ class Quadrature(Stateful):
 
     def turn_to(self, angle_rad: float, begin: Nanos, span_ns: int) -> None:
         """Put the edges on the wires that lie between the last angle and this one, over a span from `begin` on."""
-        edges = self._turn(self._address, angle_rad, begin, span_ns, self._room, *self._written)
-        if edges > self._room:
+        edges = self._turn(self._address, angle_rad, begin, span_ns)
+        if edges > self._struct.room:
             self._make_room(edges)
-            self._turn(self._address, angle_rad, begin, span_ns, self._room, *self._written)
+            self._turn(self._address, angle_rad, begin, span_ns)
         if edges:
-            place = 0
-            for net, count in zip(self._nets, self._counts, strict=True):
-                if count:
-                    net.drive_in_turn(
-                        OWNER, self._times[place : place + count], bytes(self._codes[place : place + count])
-                    )
-                place += self._room
+            struct, (a, b) = self._struct, self._nets
+            if count := struct.of_a:
+                a.drive_in_turn(OWNER, self._times[:count], bytes(self._codes[:count]))
+            if count := struct.of_b:
+                first = struct.room
+                b.drive_in_turn(OWNER, self._times[first : first + count], bytes(self._codes[first : first + count]))
 
     def _make_room(self, edges: int) -> None:
         """Have room for so many edges of each channel in a step."""
-        self._room = edges
         self._times = array("q", bytes(8 * 2 * edges))
-        self._codes = (ctypes.c_uint8 * (2 * edges))()
-        self._turn = functions().encoder_turn
-        self._written = self._times.buffer_info()[0], ctypes.addressof(self._codes), ctypes.addressof(self._counts)
+        self._codes = array("B", bytes(2 * edges))
+        self._struct.room = edges
+        self._struct.times, self._struct.codes = self._times.buffer_info()[0], self._codes.buffer_info()[0]
