@@ -11,7 +11,7 @@ from simbase.installation import way_to_build
 #: Letters of a signature, the result's first.
 _TYPES: Mapping[str, Any] = {
     "v": None, "b": ctypes.c_bool, "c": ctypes.c_uint8, "i": ctypes.c_int32, "u": ctypes.c_uint32, "l": ctypes.c_int64,
-    "q": ctypes.c_uint64, "z": ctypes.c_size_t, "p": ctypes.c_void_p, "s": ctypes.c_char_p,
+    "q": ctypes.c_uint64, "d": ctypes.c_double, "z": ctypes.c_size_t, "p": ctypes.c_void_p, "s": ctypes.c_char_p,
 }  # fmt: skip
 
 _Result = TypeVar("_Result")
@@ -35,7 +35,7 @@ def loaded(
     Args:
         path: As of `built`.
         functions: Name → signature: v nothing, b bool, c one byte, i and u 32 bits, l and q 64 bits (signed, unsigned),
-            z size, p pointer, s text; the result's letter first.
+            d double, z size, p pointer, s text; the result's letter first.
         what: What it is, for the refusal.
         module: What it was to be built as, likewise.
         kind: `ctypes.PyDLL` keeps the interpreter's lock, for callbacks that come often.

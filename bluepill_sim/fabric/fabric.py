@@ -450,6 +450,8 @@ class Fabric(Stateful):
 
     def set_samples(self, channel: int, samples: bytes) -> None:
         """Give the samples of a pin's signal: 32-bit integers of microvolts."""
+        if not samples and self._samples[channel] is None:
+            return
         kept = (ctypes.c_int32 * (len(samples) // 4)).from_buffer_copy(samples) if samples else None
         self._samples[channel] = kept
         at = None if kept is None else ctypes.addressof(kept)

@@ -114,6 +114,7 @@ class Pin:
         self.is_bonded = is_bonded
         #: Whether it bears 5 V as an input without a pull (DS5319 table 5, "FT").
         self.is_five_volt_tolerant = is_five_volt_tolerant
+        self._channel = _channel_of(self)
 
     # From outside the chip.
 
@@ -170,7 +171,7 @@ class Pin:
             ValueError: The package has no leg for this pin, or it is nothing that a pin can have.
         """
         constant = None if volts is None or isinstance(volts, Signal) else to_uv(volts)
-        channel = _channel_of(self)
+        channel = self._channel
         if isinstance(volts, Signal) and (channel is None or not self.is_bonded):
             raise ValueError(f"{self.name} leads to no ADC")
         fabric = self._bank.fabric
@@ -178,21 +179,23 @@ class Pin:
         most = volts.most_v if isinstance(volts, Signal) else volts
         if most is not None and (complaint := overvoltage(self, most)) is not None:
             self._bank.warn(complaint, once=f"{self.name}:volts")
-        self.drive(level)
         if channel is not None:
             fabric.inputs_change()
+        if level is None or not self._is_held_at(level):
+            self.drive(level)
+        if channel is not None:
             put_signal(fabric, channel, volts if isinstance(volts, Signal) else constant, self._bank.now_ns)
 
     @property
     def has_volts(self) -> bool:
         """Whether `set_volts` has put something on the wire."""
-        channel = _channel_of(self)
+        channel = self._channel
         return channel is not None and self._bank.fabric.analog_struct.signals[channel].shape != 0
 
     @property
     def volts(self) -> float | None:
         """The volts on the wire now; None of a pin that leads to no ADC. What floats has 0 V."""
-        channel = _channel_of(self)
+        channel = self._channel
         return None if channel is None else self._bank.fabric.channel_uv(channel, self._bank.now_ns) / UV_PER_V
 
     def short(self, rail: str | None) -> None:
@@ -338,6 +341,11 @@ class Pin:
     def _has(self, name: str) -> bool:
         struct = self._struct if not self._struct.shown & self._bit else self._bank.fabric.look(self._port_index)
         return bool(getattr(struct, name) & self._bit)
+
+    def _is_held_at(self, level: bool) -> bool:
+        """Tell whether the outside drives a level hard already."""
+        struct, bit = self._struct, self._bit
+        return bool(struct.outside & bit and not struct.outside_weak & bit) and bool(struct.outside_high & bit) is level
 
     def _set(self, **flags: bool) -> bool:
         """Set the pin's bits in masks of its port; return whether one has changed."""

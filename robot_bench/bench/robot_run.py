@@ -326,8 +326,8 @@ class RobotRun(Stateful):
 
     def _after_slice(self, now: Nanos) -> None:
         slice_ns = self._slice_ns if self._slices is None else self._slices.after_slice()
-        until_look = [sampler.look(now) for sampler in self.samplers]
-        self.loop.slice_ns = min(slice_ns or FIRST_SLICE_NS, *until_look) if until_look else slice_ns or FIRST_SLICE_NS
+        slice_ns = slice_ns or FIRST_SLICE_NS
+        self.loop.slice_ns = min(slice_ns, *(one.look(now) for one in self.samplers)) if self.samplers else slice_ns
         died_ns = self.chip.died_ns
         if died_ns is not None or self.chip.fault is not None:
             self.loop.end_at(self.whole_end)

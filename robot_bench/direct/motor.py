@@ -74,10 +74,10 @@ class JointMotor(Stateful):
                 code |= 1 << bit
         return motor_value(code, len(self._nets), self._bit_order)
 
-    @property
-    def fastest_um_per_s(self) -> int:
-        """Return the rim speed that no step exceeds, whatever the wires come to say."""
-        return max(abs(self.speed_um_per_s), self._step_um_per_s << len(self._nets) - 1)
+    def fastest_um_per_s(self, steps: int) -> int:
+        """Return the rim speed that none of so many next steps exceeds, whatever the wires come to say."""
+        now, most = abs(self.speed_um_per_s), self._step_um_per_s << len(self._nets) - 1
+        return max(now, most if self._change is None else min(most, now + steps * self._change))
 
     @property
     def is_steady(self) -> bool:

@@ -104,12 +104,15 @@ class DirectRobot(Stateful):
 
     def _encoders_change_at(self) -> Nanos:
         """Return the first instant of the encoders that a wheel may have come to another sector by."""
-        fastest_mps = max(self._left.fastest_um_per_s, self._right.fastest_um_per_s) / UM_PER_M
         wheels = self._wheels
         turn_rad = min(
             self._left_encoder.margin_rad(wheels.left_angle_rad), self._right_encoder.margin_rad(wheels.right_angle_rad)
         )
-        safe_until = (self._steps + self.body.steps_within(turn_rad, fastest_mps)) * self.body.dt_ns
+        # Until the next look of the sensors, which ends the wait in any case, the ramp allows no more.
+        steps = max(1, self.sensors.next_deadline() // self.body.dt_ns - self._steps)
+        fastest_um_per_s = max(self._left.fastest_um_per_s(steps), self._right.fastest_um_per_s(steps))
+        steps = min(steps, self.body.steps_within(turn_rad, fastest_um_per_s / UM_PER_M))
+        safe_until = (self._steps + steps) * self.body.dt_ns
         missed = max(0, -((self._next_encoder - safe_until) // self._encoder_period_ns))
         return self._next_encoder + missed * self._encoder_period_ns
 

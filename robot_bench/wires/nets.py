@@ -186,7 +186,8 @@ class Net(Stateful):
             LocalProtocolError: As of `drive`.
         """
         history = self._drives.get(owner)
-        if history is not None and now >= history.times[-1] and history.wave_at(now) == drive:
+        is_same = history is not None and history.codes[-1] == WAVING and history.waves[history.times[-1]] == drive
+        if history is not None and is_same and now >= history.times[-1]:
             return
         history = self._history(owner, now)
         history.times.append(now)
@@ -216,7 +217,10 @@ class Net(Stateful):
         self._kept_ns = COURSE_NS
         if self.last_edge <= begin:
             return [(begin, self._shown(begin) if self._may_wave else self._level_at_last())]
-        cuts = {at for history in self._drives.values() for at in history.between(begin, end)}
+        late = [history for history in self._drives.values() if history.times[-1] > begin]
+        if len(late) == 1:  # whose times are in order
+            return [(at, self._shown(at)) for at in (begin, *dict.fromkeys(late[0].between(begin, end)))]
+        cuts = {at for history in late for at in history.between(begin, end)}
         return [(at, self._shown(at)) for at in (begin, *sorted(cuts))]
 
     def level_without(self, owner: str, at: Nanos) -> tuple[bool | None, bool]:
@@ -333,10 +337,11 @@ class Net(Stateful):
         """Return the level at an instant, or the wave."""
         drive, codes = None, []
         for history in self._drives.values():
-            place = bisect_right(history.times, at) - 1
+            times = history.times
+            place = len(times) - 1 if times[-1] <= at else bisect_right(times, at) - 1
             code = history.codes[place] if place >= 0 else RELEASED
             if code == WAVING:
-                drive = history.waves[history.times[place]]
+                drive = history.waves[times[place]]
             else:
                 codes.append(code)
         if drive is None:

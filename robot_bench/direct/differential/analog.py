@@ -3,13 +3,13 @@
 Not modelled: noise, the colour of what is seen, and the time that a sensor needs after power-on.
 """
 
+import ctypes
 from bisect import bisect_right
 from collections.abc import Sequence
 
 from robot_bench.direct.differential.description import BatteryDescription
+from robot_bench.direct.differential.native import BatteryStruct, functions
 from simbase.state import Stateful
-
-SECONDS_PER_HOUR = 3600.0
 
 
 def volts_at(curve: Sequence[tuple[float, float]], distance_m: float) -> float:
@@ -29,18 +29,36 @@ class DischargingBattery(Stateful):
     STATE = ("used_ah", "volts")
 
     def __init__(self, settings: BatteryDescription) -> None:
-        self._settings = settings
-        self.used_ah = (1 - settings.charge) * settings.capacity_ah
-        #: Under the present load.
+        self.struct = BatteryStruct(
+            settings.full_v, settings.empty_v, settings.capacity_ah, settings.resistance_ohm, settings.idle_current_a,
+            (1 - settings.charge) * settings.capacity_ah,
+        )  # fmt: skip
+        self.address = ctypes.addressof(self.struct)
         self.volts = self.source_v
+
+    @property
+    def used_ah(self) -> float:
+        """What is gone of its charge."""
+        return float(self.struct.used_ah)
+
+    @used_ah.setter
+    def used_ah(self, used_ah: float) -> None:
+        self.struct.used_ah = used_ah
+
+    @property
+    def volts(self) -> float:
+        """Its volts under the present load."""
+        return float(self.struct.volts)
+
+    @volts.setter
+    def volts(self, volts: float) -> None:
+        self.struct.volts = volts
 
     @property
     def source_v(self) -> float:
         """Its volts without load; none once it is empty."""
-        settings = self._settings
-        left = 1 - self.used_ah / settings.capacity_ah
-        return settings.empty_v + (settings.full_v - settings.empty_v) * left if left > 0.0 else 0.0
+        return float(functions().battery_source_v(self.address))
 
     def give(self, amperes: float, span_s: float) -> None:
         """Give a current for a while; below 0 it is charged, up to full."""
-        self.used_ah = max(0.0, self.used_ah + amperes * span_s / SECONDS_PER_HOUR)
+        functions().battery_give(self.address, amperes, span_s)

@@ -14,17 +14,14 @@ Not modelled: inductance, slip, a wheel's load where the robot leans, backlash, 
 Invariant: with no volts, the kinetic energy never grows.
 """
 
+import ctypes
 import math
 from typing import NamedTuple
 
 from robot_bench.direct.differential.bridge import Shares
 from robot_bench.direct.differential.description import Differential
+from robot_bench.direct.differential.native import TrainStruct, functions
 from simbase.state import Stateful
-
-#: chosen: friction on both wheels is found by turns; each turn takes the rest down by the wheels' coupling, below 1.
-_TURNS = 50
-#: chosen: where nothing brakes, no wheel comes to this speed.
-FREE_RADPS = 1e4
 
 
 class DriveStep(NamedTuple):
@@ -52,26 +49,50 @@ class Aim(NamedTuple):
 class DriveTrain(Stateful):
     """Both wheels; `dt_s` is the length of a step."""
 
-    STATE = ("left_radps", "right_radps")
+    STATE = ("left_radps", "right_radps", "currents_a")
 
     def __init__(self, robot: Differential, dt_s: float) -> None:
         motor, body, gear = robot.motor, robot.body, robot.motor.gear_ratio
         radius = body.wheel_diameter_m / 2
-        self._dt_s = dt_s
-        self._resistance = motor.resistance_ohm + robot.bridge.resistance_ohm
-        self._drop_v = robot.bridge.drop_v
-        self._k = motor.torque_constant_nm_a * gear
-        self._friction = motor.friction_nm * gear
-        self._damping = motor.damping_nm_s * gear**2
         # chosen: a wheel is a disc
         wheel = motor.rotor_inertia_kg_m2 * gear**2 + body.wheel_mass_kg * radius**2 / 2
         both = wheel + body.mass_kg * radius**2 / 2
         apart = wheel + 2 * robot.yaw_inertia_kg_m2 * radius**2 / robot.track_m**2
         #: The wheels' inertia, and that by which one moves the other, kg·m².
         self.own, self.other = (both + apart) / 2, (both - apart) / 2
-        #: Speeds of the wheels now, rad/s.
-        self.left_radps = 0.0
-        self.right_radps = 0.0
+        self.struct = TrainStruct(
+            dt_s, motor.resistance_ohm + robot.bridge.resistance_ohm, robot.bridge.drop_v,
+            motor.torque_constant_nm_a * gear, motor.friction_nm * gear, motor.damping_nm_s * gear**2,
+            self.own, self.other,
+        )  # fmt: skip
+        self.address = ctypes.addressof(self.struct)
+
+    @property
+    def left_radps(self) -> float:
+        """Speed of the left wheel now, rad/s."""
+        return float(self.struct.left_radps)
+
+    @left_radps.setter
+    def left_radps(self, radps: float) -> None:
+        self.struct.left_radps = radps
+
+    @property
+    def right_radps(self) -> float:
+        """Speed of the right wheel now, rad/s."""
+        return float(self.struct.right_radps)
+
+    @right_radps.setter
+    def right_radps(self, radps: float) -> None:
+        self.struct.right_radps = radps
+
+    @property
+    def currents_a(self) -> tuple[float, float]:
+        """Mean currents of the windings in the last step, left and right, A."""
+        return self.struct.left_a, self.struct.right_a
+
+    @currents_a.setter
+    def currents_a(self, currents_a: tuple[float, float]) -> None:
+        self.struct.left_a, self.struct.right_a = currents_a
 
     @property
     def kinetic_j(self) -> float:
@@ -81,86 +102,35 @@ class DriveTrain(Stateful):
 
     def supply_v(self, left: Shares, right: Shares, source_v: float, source_ohm: float, idle_a: float) -> float:
         """Return the supply's volts at the speeds of now, where its source has a resistance."""
-        conductance = (left.forward + left.reverse + right.forward + right.reverse) / self._resistance
-        emf_a = self._k / self._resistance * (
-            (left.forward - left.reverse) * self.left_radps + (right.forward - right.reverse) * self.right_radps
-        )  # fmt: skip
-        lost_v = self._drop_v * conductance
-        return max(0.0, (source_v - source_ohm * (idle_a - emf_a - lost_v)) / (1 + source_ohm * conductance))
+        given = _given(left), _given(right)
+        return float(functions().train_supply_v(self.address, *given, source_v, source_ohm, idle_a))
 
     def step(self, left: Shares, right: Shares, supply_v: float) -> DriveStep:
         """Take a step."""
-        volts, k, resistance, dt = max(0.0, supply_v - self._drop_v), self._k, self._resistance, self._dt_s
-        pull = k / resistance
-        along_l, along_r = left.forward - left.reverse, right.forward - right.reverse
-        driven_l, driven_r = left.forward + left.reverse, right.forward + right.reverse
-        torque_l, torque_r = pull * volts * along_l, pull * volts * along_r
-        brake_l = pull * k * (driven_l + left.brake) + self._damping
-        brake_r = pull * k * (driven_r + right.brake) + self._damping
-        # (M + B dt/2) (after − before) = dt (torque − B before + friction)
-        own_l, own_r, other = self.own + brake_l * dt / 2, self.own + brake_r * dt / 2, self.other
-        scale = dt / (own_l * own_r - other * other)
-        push_l = torque_l - brake_l * self.left_radps
-        push_r = torque_r - brake_r * self.right_radps
-        free_l = self.left_radps + scale * (own_r * push_l - other * push_r)
-        free_r = self.right_radps + scale * (own_l * push_r - other * push_l)
-        after_l, after_r = self._rubbed(free_l, free_r, scale * own_r, scale * own_l, -scale * other)
-        return self.take(left, right, supply_v, after_l, after_r)
+        functions().train_step(self.address, _given(left), _given(right), supply_v)
+        return self._made()
 
-    def aims(self, left: Shares, right: Shares, supply_v: float) -> tuple["Aim", "Aim"]:
+    def aims(self, left: Shares, right: Shares, supply_v: float) -> tuple[Aim, Aim]:
         """Return what each motor makes of its wheel in a step of a body that has the masses."""
-        volts = max(0.0, supply_v - self._drop_v)
-        return self._aim(left, volts, self.left_radps), self._aim(right, volts, self.right_radps)
+        return self._aim(left, supply_v, self.left_radps), self._aim(right, supply_v, self.right_radps)
 
-    def _aim(self, shares: Shares, volts: float, speed: float) -> "Aim":
-        pull, rub = self._k / self._resistance, self._friction
-        drive = pull * volts * (shares.forward - shares.reverse)
-        brake = pull * self._k * (shares.forward + shares.reverse + shares.brake) + self._damping
-        if speed == 0.0:
-            if abs(drive) <= rub:
-                return Aim(0.0, rub)
-            way = math.copysign(1.0, drive)
-        else:
-            way = math.copysign(1.0, speed)
-        net = drive - rub * way
-        most = abs(net - brake * speed)
-        if net * way > 0.0:
-            return Aim(net / brake if brake else way * FREE_RADPS, most)
-        if abs(drive) <= rub:  # friction and brake alone: it ends in rest
-            return Aim(0.0, most)
-        back = drive + rub * way
-        return Aim(back / brake if brake else -way * FREE_RADPS, most)
+    def _aim(self, shares: Shares, supply_v: float, speed: float) -> Aim:
+        aim = (ctypes.c_double * 2)()
+        functions().train_aim(self.address, _given(shares), supply_v, speed, aim)
+        return Aim(*aim)
 
     def take(self, left: Shares, right: Shares, supply_v: float, left_radps: float, right_radps: float) -> DriveStep:
         """Take the speeds to which a body has come with the last `aims`."""
-        volts, k, resistance = max(0.0, supply_v - self._drop_v), self._k, self._resistance
-        mean_l, mean_r = (self.left_radps + left_radps) / 2, (self.right_radps + right_radps) / 2
-        self.left_radps, self.right_radps = left_radps, right_radps
-        along_l, along_r = left.forward - left.reverse, right.forward - right.reverse
-        driven_l, driven_r = left.forward + left.reverse, right.forward + right.reverse
-        left_a = (along_l * volts - (driven_l + left.brake) * k * mean_l) / resistance
-        right_a = (along_r * volts - (driven_r + right.brake) * k * mean_r) / resistance
-        supply_a = ((driven_l + driven_r) * volts - k * (along_l * mean_l + along_r * mean_r)) / resistance
-        return DriveStep(mean_l, mean_r, left_a, right_a, supply_a)
+        functions().train_take(self.address, _given(left), _given(right), supply_v, left_radps, right_radps)
+        return self._made()
 
-    def _rubbed(self, left: float, right: float, own_l: float, own_r: float, other: float) -> tuple[float, float]:
-        """Return speeds with friction, from those without; the rest are the speeds that a torque of 1 N·m adds."""
-        most = self._friction
-        if most == 0.0:
-            return left, right
-        whole = own_l * own_r - other * other
-        if abs(own_r * left - other * right) < most * whole and abs(own_l * right - other * left) < most * whole:
-            return 0.0, 0.0  # it holds both
-        rub_l = rub_r = 0.0
-        for _ in range(_TURNS):
-            before = rub_l, rub_r
-            rub_l = min(max(-(left + other * rub_r) / own_l, -most), most)
-            rub_r = min(max(-(right + other * rub_l) / own_r, -most), most)
-            if (rub_l, rub_r) == before:
-                break
-        after_l, after_r = left + own_l * rub_l + other * rub_r, right + other * rub_l + own_r * rub_r
-        # What friction holds stands still, and does not creep by the rounding of floats.
-        return (0.0 if abs(rub_l) < most else after_l), (0.0 if abs(rub_r) < most else after_r)
+    def _made(self) -> DriveStep:
+        made = self.struct
+        return DriveStep(made.mean_left, made.mean_right, made.left_a, made.right_a, made.supply_a)
+
+
+def _given(shares: Shares) -> "ctypes.Array[ctypes.c_double]":
+    return (ctypes.c_double * 3)(*shares)
 
 
 def no_load_radps(robot: Differential) -> float:

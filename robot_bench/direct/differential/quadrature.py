@@ -6,9 +6,11 @@ that follows, one step late, each where the wheel came to it if it turned evenly
 Invariant: after the edges of a step, the wires show the wheel's angle at the end of that step.
 """
 
+import ctypes
 import math
 from array import array
 
+from robot_bench.direct.differential.native import EncoderStruct, functions
 from robot_bench.wires.nets import Net, Strength
 from simbase.state import Stateful
 from simbase.timing import Nanos
@@ -18,6 +20,8 @@ OWNER = "robot"
 _CODES = Strength.PUSH_PULL.codes
 #: The levels of A and B in the four quarters of a line.
 QUARTERS = ((False, False), (True, False), (True, True), (False, True))
+#: chosen: as many edges of a step as an encoder has room for at first.
+_ROOM = 64
 
 
 class Quadrature(Stateful):
@@ -30,12 +34,24 @@ class Quadrature(Stateful):
     """
 
     STATE = ("_angle",)
+    #: What a step has written is read at once.
+    DERIVED = ("_times", "_codes")
 
     def __init__(self, a: Net, b: Net, edges_per_turn: float) -> None:
         self._nets = (a, b)
-        self._per_rad = edges_per_turn / (2 * math.pi)
-        #: In edges since the start.
-        self._angle = 0.0
+        self._struct = EncoderStruct(edges_per_turn / (2 * math.pi), 0.0, _CODES)
+        self._address = ctypes.addressof(self._struct)
+        self._turn = functions().encoder_turn
+        self._make_room(_ROOM)
+
+    @property
+    def _angle(self) -> float:
+        """In edges since the start."""
+        return float(self._struct.angle)
+
+    @_angle.setter
+    def _angle(self, edges: float) -> None:
+        self._struct.angle = edges
 
     def start(self) -> None:
         """Show the wheel as it stands at time 0."""
@@ -44,24 +60,21 @@ class Quadrature(Stateful):
 
     def turn_to(self, angle_rad: float, begin: Nanos, span_ns: int) -> None:
         """Put the edges on the wires that lie between the last angle and this one, over a span from `begin` on."""
-        before, after = self._angle, angle_rad * self._per_rad
-        self._angle = after
-        first, last = math.floor(before), math.floor(after)
-        if first == last:
-            return
-        times, codes = (array("q"), array("q")), (bytearray(), bytearray())
-        way = after - before
-        # An edge lies where the angle is a whole number: forward the one that is reached, in reverse the one left.
-        table, edges = (_FORWARD, range(first + 1, last + 1)) if last > first else (_REVERSE, range(first, last, -1))
-        for edge in edges:
-            channel, code = table[edge & 3]
-            times[channel].append(begin + min(max(round((edge - before) / way * span_ns), 1), span_ns))
-            codes[channel].append(code)
-        for net, when, what in zip(self._nets, times, codes, strict=True):
-            if when:
-                net.drive_in_turn(OWNER, when, bytes(what))
+        edges = self._turn(self._address, angle_rad, begin, span_ns)
+        if edges > self._struct.room:
+            self._make_room(edges)
+            self._turn(self._address, angle_rad, begin, span_ns)
+        if edges:
+            struct, (a, b) = self._struct, self._nets
+            if count := struct.of_a:
+                a.drive_in_turn(OWNER, self._times[:count], bytes(self._codes[:count]))
+            if count := struct.of_b:
+                first = struct.room
+                b.drive_in_turn(OWNER, self._times[first : first + count], bytes(self._codes[first : first + count]))
 
-
-#: What the edge at a number of edges does, modulo four: the channel, and the code of its level behind the edge.
-_FORWARD = tuple((1 - edge % 2, _CODES[QUARTERS[edge][1 - edge % 2]]) for edge in range(4))
-_REVERSE = tuple((1 - edge % 2, _CODES[QUARTERS[edge - 1][1 - edge % 2]]) for edge in range(4))
+    def _make_room(self, edges: int) -> None:
+        """Have room for so many edges of each channel in a step."""
+        self._times = array("q", bytes(8 * 2 * edges))
+        self._codes = array("B", bytes(2 * edges))
+        self._struct.room = edges
+        self._struct.times, self._struct.codes = self._times.buffer_info()[0], self._codes.buffer_info()[0]

@@ -20,7 +20,8 @@ from p2os.pioneer.body.contract import RobotBody, Wheels
 from robot_bench.direct.differential.analog import DischargingBattery, volts_at
 from robot_bench.direct.differential.bridge import HBridge, Shares
 from robot_bench.direct.differential.description import SIDES, Differential
-from robot_bench.direct.differential.drive_train import DriveStep, DriveTrain
+from robot_bench.direct.differential.drive_train import DriveTrain
+from robot_bench.direct.differential.native import functions
 from robot_bench.direct.differential.quadrature import OWNER, Quadrature
 from robot_bench.direct.robot import STALLS
 from robot_bench.direct.wired import AnalogPin
@@ -28,8 +29,6 @@ from robot_bench.wires.nets import Harness, Strength
 from simbase.state import Stateful
 from simbase.timing import NS_PER_S, Nanos, Reached
 
-#: chosen: a wheel's own speed counts from this difference to its motor on, as a part and as a speed of the rim.
-HELD_SHARE, HELD_MPS = 0.1, 0.001
 #: chosen: the kinematic body is told whole micrometres a second: a robot that stands at a wall while its battery falls
 #: is told the same for many steps, and the body need not look again for a way.
 SPEED_DIGITS = 6
@@ -53,7 +52,7 @@ class DifferentialRobot(Stateful):
 
     STATE = (
         "body", "train", "cell", "_encoders", "_bridges", "_steps", "_angles", "_next_distance", "_stalled",
-        "_steps_of_volts", "currents_a", "_asked", "_stepped", "_driven",
+        "_steps_of_volts", "_asked", "_stepped", "_driven",
     )  # fmt: skip
 
     def __init__(
@@ -65,8 +64,6 @@ class DifferentialRobot(Stateful):
         self._dt_s = body.dt_ns / NS_PER_S
         self.train = DriveTrain(robot, self._dt_s)
         self.cell = DischargingBattery(robot.battery)
-        #: Mean currents of the windings in the last step, left and right, A.
-        self.currents_a = (0.0, 0.0)
         #: Tells a body that has the masses how hard its motors drive in the next step.
         self._torques: Callable[[float, float], None] | None = getattr(body, "limit_torques", None)
         self._bridges = tuple(
@@ -96,6 +93,11 @@ class DifferentialRobot(Stateful):
             encoder.start()
         self._show(0)
 
+    @property
+    def currents_a(self) -> tuple[float, float]:
+        """Mean currents of the windings in the last step, left and right, A."""
+        return self.train.currents_a
+
     def next_deadline(self) -> Nanos:
         """Return when the step that is under way ends."""
         return (self._steps + 1) * self.body.dt_ns
@@ -117,41 +119,46 @@ class DifferentialRobot(Stateful):
     def _step(self) -> None:
         body, cell, battery = self.body, self.cell, self._robot.battery
         begin, end = self._steps * body.dt_ns, (self._steps + 1) * body.dt_ns
-        left, right = self._bridges[0].shares(begin, end), self._bridges[1].shares(begin, end)
-        cell.volts = self.train.supply_v(left, right, cell.source_v, battery.resistance_ohm, battery.idle_current_a)
-        made, turned_l, turned_r = (self._drive if self._torques is None else self._push)(left, right)
+        left, right = self._bridges
+        left.take(begin, end)
+        right.take(begin, end)
+        turned_l, turned_r = self._drive() if self._torques is None else self._push(left.known, right.known)
         self._angles = turned_l, turned_r
-        self.currents_a = made.left_a, made.right_a
-        cell.give(made.supply_a + battery.idle_current_a, self._dt_s)
+        cell.give(self.train.struct.supply_a + battery.idle_current_a, self._dt_s)
         self._steps += 1
         self._encoders[0].turn_to(turned_l, end, body.dt_ns)
         self._encoders[1].turn_to(turned_r, end, body.dt_ns)
         self._show(end)
 
-    def _drive(self, left: Shares, right: Shares) -> tuple[DriveStep, float, float]:
-        """Make a step of a body that takes speeds; return what became of the drive train, and the wheels' angles."""
-        train = self.train
-        made = train.step(left, right, self.cell.volts)
-        (asked_l, asked_r), turned_l, turned_r = self._turn(made.left_radps, made.right_radps)
-        real_l, real_r = self._real(turned_l, turned_r)
-        train.left_radps = self._held(asked_l, real_l, train.left_radps)
-        train.right_radps = self._held(asked_r, real_r, train.right_radps)
-        return made, turned_l, turned_r
+    def _drive(self) -> tuple[float, float]:
+        """Make a step of a body that takes speeds; return the wheels' angles."""
+        train, (left, right) = self.train, self._bridges
+        functions().drive_begin(train.address, self.cell.address, left.address, right.address)
+        made, (angle_l, angle_r) = train.struct, self._angles
+        (asked_l, asked_r), turned_l, turned_r = self._turn(made.mean_left, made.mean_right)
+        functions().drive_end(
+            train.address, asked_l, asked_r, turned_l - angle_l, turned_r - angle_r, self._radius_m
+        )  # fmt: skip
+        return turned_l, turned_r
 
-    def _push(self, left: Shares, right: Shares) -> tuple[DriveStep, float, float]:
+    def _push(self, left: Shares, right: Shares) -> tuple[float, float]:
         """Make a step of a body that has the masses and takes torques; return the same."""
-        train, volts = self.train, self.cell.volts
+        train, cell, battery = self.train, self.cell, self._robot.battery
+        cell.volts = volts = train.supply_v(
+            left, right, cell.source_v, battery.resistance_ohm, battery.idle_current_a
+        )  # fmt: skip
         if self.is_stepped_by_others:
             # The step that is over was made with what the wires said in the one before.
             (was_left, was_right, was_volts), self._driven = self._driven, (tuple(left), tuple(right), volts)
             turned_l, turned_r = self._stepped
             real_l, real_r = self._real(turned_l, turned_r)
-            made = train.take(Shares(*was_left), Shares(*was_right), was_volts, _or_rest(real_l), _or_rest(real_r))
+            train.take(Shares(*was_left), Shares(*was_right), was_volts, _or_rest(real_l), _or_rest(real_r))
             self._asked = self._aim(left, right, volts)
-            return made, turned_l, turned_r
+            return turned_l, turned_r
         _, turned_l, turned_r = self._turn(*self._aim(left, right, volts))
         real_l, real_r = self._real(turned_l, turned_r)
-        return train.take(left, right, volts, _or_rest(real_l), _or_rest(real_r)), turned_l, turned_r
+        train.take(left, right, volts, _or_rest(real_l), _or_rest(real_r))
+        return turned_l, turned_r
 
     def _aim(self, left: Shares, right: Shares, volts: float) -> tuple[float, float]:
         """Tell the body how hard its motors drive; return where to, rad/s."""
@@ -179,11 +186,6 @@ class DifferentialRobot(Stateful):
         """Return how fast the wheels have turned in a step, rad/s."""
         angle_l, angle_r = self._angles
         return (turned_l - angle_l) / self._dt_s, (turned_r - angle_r) / self._dt_s
-
-    def _held(self, asked: float, real: float, now: float) -> float:
-        """Return a motor's speed, which is its wheel's where that is held."""
-        apart = abs(real - asked)
-        return real if apart > HELD_SHARE * abs(asked) and apart * self._radius_m > HELD_MPS else now
 
     def _show(self, now: Nanos) -> None:
         """Show the sensors that are due."""

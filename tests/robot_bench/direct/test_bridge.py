@@ -1,5 +1,6 @@
 """The H-bridge: parts of a span, exact for levels and waves, against walking every nanosecond's edges."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import pytest
@@ -10,7 +11,7 @@ from bluepill_sim.fabric.subscriptions import Wave
 from robot_bench.direct.differential.bridge import TRUTH, HBridge
 from robot_bench.direct.differential.description import BridgeDescription, BridgeKind, Off
 from robot_bench.wires.nets import Net, Strength, WaveDrive
-from robot_bench.wires.waves import edge_times, high_time_ns
+from robot_bench.wires.waves import edge_times
 from simbase.timing import NS_PER_S
 
 QUICK = settings(max_examples=80)
@@ -114,7 +115,12 @@ def test_the_high_time_is_that_between_the_edges_to_a_nanosecond_each(
             ticks = one.at + ((first - one.ns + 1) * one.ticks_hz - 1) // NS_PER_S
             risen = one.ns + (ticks // one.period * one.period - one.at) * NS_PER_S // one.ticks_hz
             walked += max(0, last - max(first, risen + dead_ns))
-    assert high_time_ns(one, begin, begin + span, dead_ns) == pytest.approx(walked, abs=2 * len(cuts) + 2)
+    made, (pwm, direction) = bridge(BridgeKind.PWM_DIR, Off.COAST, dead_ns)
+    direction.drive("chip", True, PP, 0)
+    pwm.wave_from("chip", WaveDrive(replace(one, ns=one.ns + MS), PP.codes), 0)  # past any dead time of the pins
+    found = made.shares(begin + MS, begin + MS + span)
+    assert found.forward * span == pytest.approx(walked, abs=2 * len(cuts) + 2)
+    assert found.reverse == found.brake == 0
 
 
 @QUICK

@@ -83,7 +83,7 @@ def test_at_the_threshold_is_not_nearer() -> None:
     assert reported == [(7, [0.599_999, 0.6, 5.0])]
 
 
-def robot() -> tuple[DirectRobot, list[Net], list[Net], list[Net]]:
+def robot(encoder_nets: list[Net] | None = None) -> tuple[DirectRobot, list[Net], list[Net], list[Net]]:
     parameters = load_parameters("p2dx")
     world = load_world("room")
     body = make_body("kinematic", world, parameters)
@@ -96,7 +96,7 @@ def robot() -> tuple[DirectRobot, list[Net], list[Net], list[Net]]:
         body,
         left=JointMotor(left, step_um_per_s=62_500, ramp_um_per_s2=300_000, dt_ns=body.dt_ns),
         right=JointMotor(right, step_um_per_s=62_500, ramp_um_per_s2=300_000, dt_ns=body.dt_ns),
-        encoders=(WheelEncoder(nets()), WheelEncoder(nets())),
+        encoders=(WheelEncoder(encoder_nets or nets()), WheelEncoder(nets())),
         sensors=DistanceSensors(distances, threshold_um=600_000, period_ns=50 * MS),
         sonar_numbers=range(8),
         encoder_period_ns=5 * MS,
@@ -111,6 +111,48 @@ def test_three_steps_for_two_seconds_is_three_steps_of_way() -> None:
     made.advance_to(2_000 * MS)
     # 187.5 mm/s less the ramp's triangle: half of 0.625 s at 187.5 mm/s, and half a step of 0.3 mm/s.
     assert made.body.state.x_m == pytest.approx(0.1875 * 2 - 0.1875 * 0.625 / 2, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("ramp", "steps", "fastest"),
+    [(300_000, 1, 600), (300_000, 50, 15_300), (300_000, 2000, 250_000), (None, 1, 250_000)],
+)
+def test_the_fastest_of_the_next_steps_is_what_the_ramp_allows(ramp: int | None, steps: int, fastest: int) -> None:
+    made = nets()
+    motor = JointMotor(made, step_um_per_s=62_500, ramp_um_per_s2=ramp, dt_ns=MS)
+    set_value(made, 3, 0)
+    motor.step(0)
+    set_value(made, -4, MS)
+    assert motor.fastest_um_per_s(steps) == fastest
+
+
+@given(st.integers(0, 2_000), st.sampled_from([-4, 3]), st.sampled_from([-1, 1, 3]))
+@settings(max_examples=15)
+def test_no_encoder_changes_before_the_deadline_whatever_the_wires_come_to_say(at: int, later: int, value: int) -> None:
+    shown = nets()
+    made, left, right, _ = robot(shown)
+    for motor_nets in (left, right):
+        set_value(motor_nets, value, 0)
+    made.advance_to(at * MS)
+    due = made.next_deadline()
+    before = [net.level(at * MS) for net in shown]
+    for motor_nets in (left, right):
+        set_value(motor_nets, later, at * MS)
+    made.advance_to(due - 1)
+    assert [net.level(due - 1) for net in shown] == before
+
+
+def test_a_robot_that_creeps_is_not_looked_at_as_if_it_raced() -> None:
+    made, left, right, _ = robot()
+    for motor_nets in (left, right):
+        set_value(motor_nets, 1, 0)
+    made.advance_to(1_000 * MS)
+    looks = 0
+    while (due := made.next_deadline()) <= 2_000 * MS:
+        made.advance_to(due)
+        looks += 1
+    # 20 of the sensors, and a few before each sector of 65 mm; by the greatest speed that there is, 39 in all.
+    assert 20 <= looks <= 28
 
 
 @given(st.lists(st.integers(1, 300 * MS), max_size=8))

@@ -53,6 +53,13 @@ def test_an_edge_comes_when_its_angle_is_reached_and_not_before(nudge: float) ->
     assert counted(a, b, 10 * MS)[0] == (1 if nudge > 0 else 0)
 
 
+@pytest.mark.parametrize(("span_ns", "at"), [(5, 2), (3, 2), (1, 1), (4, 2)])
+def test_an_edge_between_two_nanoseconds_is_at_the_even_one_and_within_the_span(span_ns: int, at: int) -> None:
+    encoder, a, _ = made(4.0)
+    encoder.turn_to(math.pi, 0, span_ns)  # half a line: A rises in the middle
+    assert list(a.edges_until(span_ns)) == [(at, 1)]
+
+
 @QUICK
 @given(st.lists(st.floats(-3, 3), min_size=1, max_size=20), st.floats(4, 4000))
 def test_a_timer_counts_the_wheel_s_angle_and_its_edges_keep_their_order(turns: list[float], per_turn: float) -> None:

@@ -44,6 +44,10 @@ MADE, READ_BY_THE_BUILD = (
     (
         "bluepill_sim/extension/source/",
         "bluepill_sim/cli/browser/source/",
+        *(
+            f"robot_bench/direct/differential/{name}"
+            for name in ("bridge.c", "bridge.h", "drive_train.c", "quadrature.c")
+        ),
         "robot_bench/wires/edges.c",
     ),
 )

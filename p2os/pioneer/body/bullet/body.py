@@ -369,11 +369,9 @@ class BulletBody(EngineBody):
 
     def ranges(self, numbers: Sequence[int]) -> list[float]:
         """Return the nearest echo of each cone, metres; the rays tilt with the body."""
-        hits, rays = self._cast(numbers), self._sonar_rays.rays
+        shares, rays = [hit[2] for hit in self._cast(numbers)], self._sonar_rays.rays
         longest = self._sonar_rays.longest_m
-        found = [
-            longest * min(hit[2] for hit in hits[rays * place : rays * (place + 1)]) for place in range(len(numbers))
-        ]
+        found = [longest * min(shares[rays * place : rays * (place + 1)]) for place in range(len(numbers))]
         return self._readings(numbers, found)
 
     def echoes(self, numbers: Sequence[int]) -> list[list[Echo]]:
@@ -394,7 +392,10 @@ class BulletBody(EngineBody):
             return []
         _ = self.state  # reads the robot's frame
         starts, ends = (rays or self._sonar_rays).points(numbers, self._origin, self._matrix)
-        hits = pybullet.rayTestBatch(starts, ends, collisionFilterMask=ECHOING, physicsClientId=self._client)
+        # The engine reads lists faster than arrays.
+        hits = pybullet.rayTestBatch(
+            starts.tolist(), ends.tolist(), collisionFilterMask=ECHOING, physicsClientId=self._client
+        )  # fmt: skip
         return cast("list[tuple[Any, ...]]", hits)
 
     def _where_is(self, name: str) -> tuple[float, float, Sequence[float]]:
