@@ -4,7 +4,8 @@ Functions are paired by name, and their instructions aligned. What follows from 
 branch or a call, a pointer in a literal pool) is compared by what it leads to: the instruction, the symbol, the text.
 
 Of a difference the source lines are known by what each line of a function came to: a line whose instructions are the
-same but for the registers that the compiler chose has not changed, whatever has changed around it.
+same but for the registers that the compiler chose has not changed, whatever has changed around it. Where all lines are
+the same in that sense, one with other registers differs if it is the only one: it takes another variable.
 
 Invariant: a program does not differ from itself, nor from itself linked elsewhere.
 """
@@ -60,8 +61,8 @@ def line_differences(ours: Image, theirs: Image) -> list[LineDifference]:
         ImageError: The debug information of one is damaged.
     """
     mine, other, tables = _Version(ours), _Version(theirs), (read_lines(ours), read_lines(theirs))
-    found = []
-    for name in dict.fromkeys(one.function for one in code_differences(ours, theirs)):
+    found, differences = [], code_differences(ours, theirs)
+    for name in dict.fromkeys(one.function for one in differences):
         pair = mine.functions.get(name), other.functions.get(name)
         if pair[0] is None or pair[1] is None:
             continue
@@ -71,7 +72,7 @@ def line_differences(ours: Image, theirs: Image) -> list[LineDifference]:
             if tag != "equal":
                 places = (tuple(place for place, _ in rows) for rows in (one[i0:i1], two[j0:j1]))
                 found.append(LineDifference(name, *places))
-    return found
+    return found or _by_registers(differences, tables)
 
 
 def code_differences(ours: Image, theirs: Image) -> list[CodeDifference]:
@@ -190,10 +191,29 @@ def _by_line(version: _Function, table: LineTable) -> list[tuple[tuple[str, int]
     """Return the lines that a function has code of, in their order, each with what it came to."""
     found: dict[tuple[str, int], list[str]] = {}
     for address, plain in zip(version.addresses, version.plain, strict=True):
-        row = table.at(address)
-        if row is not None:
-            found.setdefault((row.file.rsplit("/", 1)[-1], row.line), []).append(plain)
+        place = _place(table, address)
+        if place is not None:
+            found.setdefault(place, []).append(plain)
     return sorted((place, tuple(sorted(code))) for place, code in found.items())
+
+
+def _by_registers(differences: Sequence[CodeDifference], tables: tuple[LineTable, LineTable]) -> list[LineDifference]:
+    """Return the line that all differences are of; none where they are of several, or one has none."""
+    found = {
+        (one.function, tuple({_place(table, at) for at in side}))
+        for one in differences
+        for side, table in zip((one.ours, one.theirs), tables, strict=True)
+    }
+    if len(found) != 1:
+        return []
+    function, places = found.pop()
+    lines = tuple(place for place in places if place is not None)
+    return [LineDifference(function, lines, lines)] if len(lines) == len(places) == 1 else []
+
+
+def _place(table: LineTable, address: int) -> tuple[str, int] | None:
+    row = table.at(address)
+    return None if row is None else (row.file.rsplit("/", 1)[-1], row.line)
 
 
 def _within(name: str, one: _Function, two: _Function) -> Iterator[CodeDifference]:

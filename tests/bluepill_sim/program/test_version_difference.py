@@ -75,6 +75,29 @@ def test_a_change_is_in_its_line_and_in_no_function_but_its_own(
     assert {one.function for one in code_differences(good, bad)} == {found[0].function}
 
 
+SUM = "way = left_steps + right_steps, twist = right_steps - left_steps;"
+PARAMETERS = "int32_t left_steps, int32_t right_steps)\n"
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "named"),
+    [
+        ("back_on(dodge, way, twist);", "back_on(dodge, twist, twist);", "back_on(dodge, way, twist);"),
+        (SUM, "way = left_steps + right_steps, twist = left_steps - right_steps;", SUM),
+        (PARAMETERS, "int32_t right_steps, int32_t left_steps)\n", SUM),  # a parameter where it is used
+        ("back_on(struct dodge *dodge, int32_t way, int32_t twist)",
+         "back_on(struct dodge *dodge, int32_t twist, int32_t way)", ""),  # in more than one
+    ],
+)  # fmt: skip
+def test_a_line_that_takes_another_variable_is_known_where_it_is_the_only_one(
+    right: str, wrong: str, named: str, good: Image, tmp_path: Path
+) -> None:
+    bad = built(tmp_path, right, wrong)
+    assert code_differences(bad, good)
+    lines = [place for one in line_differences(bad, good) for place in one.theirs]
+    assert lines == ([(SOURCE, line_of(named))] if named else [])
+
+
 def test_a_branch_that_leads_elsewhere_is_a_difference(good: Image) -> None:
     """Of two `beq` with other offsets the targets are compared, and not the offsets."""
     address = next(symbol.address for symbol in good.symbols.symbols if symbol.name == "left_danger")

@@ -2,9 +2,10 @@
 
     python tools/bench/campaigns/faults/lines.py FOLDER [NAME...] [--seed 41] [--back] [--runs 24] [--minutes 10]
 
-FOLDER has the programs (`draw.py --build FOLDER`); beside each a campaign's folder of so many points is made, which a
-later call takes. `--back` changes the program back in place of naming a good version. A line is printed for each: what
-was said, and whether the planted line is among the lines that it names (`right`), is not (`wrong`), or none is named.
+FOLDER has the programs (`draw.py --build FOLDER`). The failure that `search.py FOLDER` has left is taken; where there
+is none, a campaign's folder of so many points is made beside the program, which a later call takes. `--back` changes
+the program back in place of naming a good version. A line is printed for each: what was said, and whether the planted
+line is among the lines that it names (`right`), is not (`wrong`), or none is named.
 """
 
 import argparse
@@ -12,11 +13,16 @@ import json
 import re
 import subprocess
 import sys
+from dataclasses import asdict
 from pathlib import Path
 
 import draw
 
+from robot_bench.campaign.trial import trial_of
+from robot_bench.campaign.variants.against import Other
+from robot_bench.campaign.variants.fault_line import by_version
 from robot_bench.firmware.build import HERE
+from simbase.errors import UsageError
 
 P2OS = Path(sys.executable).with_name("p2os")
 #: chosen: what fails is not at stake here.
@@ -36,6 +42,17 @@ def campaign(name: str, folder: Path, runs: int) -> Path:
         asked = ["--resume", str(out)] if out.is_dir() else [str(file), "--out", str(out)]
         _p2os("campaign", *asked, "-j", "1")
     return out
+
+
+def by_failure(name: str, folder: Path, good: Path) -> dict[str, str] | None:
+    """Return what `p2os explain --against` says of the failure that a search has left; None where there is none."""
+    left = sorted(folder.glob(f"{name}-seed*/failure/*.toml"))
+    if not left:
+        return None
+    try:
+        return asdict(by_version(trial_of(str(left[0])), Other.read(good)))
+    except UsageError as error:
+        return {"line": "", "says": str(error)}
 
 
 def judged(found: dict[str, str], fault: draw.DrawnFault) -> str:
@@ -70,10 +87,13 @@ def main() -> int:
         for number, fault in enumerate((one for one in draw.kept(asked.seed) if one.program == program), 1)
     }
     for name in asked.names or faults:
-        out = campaign(name, asked.folder, asked.runs)
-        against = [] if asked.back else ["--against", str(HERE / f"{faults[name].program}.elf")]
-        said = _p2os("explain", str(out), *against, "--minutes", str(asked.minutes), "--json")
-        found = json.loads(said) if said.startswith("{") else {"line": "", "says": "nothing fails"}
+        good = HERE / f"{faults[name].program}.elf"
+        found = None if asked.back else by_failure(name, asked.folder, good)
+        if found is None:
+            out = campaign(name, asked.folder, asked.runs)
+            against = [] if asked.back else ["--against", str(good)]
+            said = _p2os("explain", str(out), *against, "--minutes", str(asked.minutes), "--json")
+            found = json.loads(said) if said.startswith("{") else {"line": "", "says": "nothing fails"}
         planted = f"{faults[name].file}:{faults[name].line}"
         print(f"{name} {planted}: {judged(found, faults[name])}: {found['line']} {found['says']}", flush=True)
     return 0
