@@ -82,7 +82,9 @@ class Nearest:
             return tuple([*by_name, *sorted({*files} & {*self._tests} - {*by_name})][:MOST_FILES])
         near = [name for name in by_name if name in ran]
         mirror = f"tests/{path.rpartition('/')[0]}"
-        others = sorted(ran - {*near}, key=lambda name: (WHOLE not in _words(name), _apart(mirror, _folder(name)), name))
+        others = sorted(
+            ran - {*near}, key=lambda name: (WHOLE not in _words(name), _apart(mirror, _folder(name)), name)
+        )
         known = [*near, *others][: MOST_FILES - NOT_COUNTED]
         # What was written since the suite was counted is known by its imports alone.
         return (*known, *[name for name in by_name if name not in known][:NOT_COUNTED])
@@ -101,10 +103,10 @@ class Nearest:
         does_import = any(name == module or name.startswith(f"{module}.") for name in imported)
         if mirrors and (does_import or apart <= 1 or test.startswith(f"{folder}/")):
             return 0, WHOLE not in words, apart
-        if WHOLE in words and f"{folder}/".startswith(f"{its_folder.removesuffix(f'/{WHOLE}')}/"):
-            return 1, False, apart  # it goes through all that the folder above it has
-        if does_import:
-            return 1, not {*stem.split("_")} & words, apart
+        # Walks go through all that the folder above them has.
+        is_walk = WHOLE in words and f"{folder}/".startswith(f"{its_folder.removesuffix(f'/{WHOLE}')}/")
+        if does_import or is_walk:
+            return 1, not is_walk and not {*stem.split("_")} & words, apart
         package = module.rpartition(".")[0]
         if apart <= 1 and any(name == package or name.startswith(f"{package}.") for name in imported):
             return 2, not {*stem.split("_")} & words, apart

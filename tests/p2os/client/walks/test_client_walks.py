@@ -1,4 +1,4 @@
-"""Programs that do anything with a robot over lines of any sort, against what was approved: what is sent and said, when."""
+"""Programs that do anything with a robot over lines of any sort: what is sent and told, and when, as approved."""
 
 import math
 import random
@@ -13,13 +13,13 @@ from p2os.protocol.commands import CommandNumber as C
 from p2os.protocol.profiles import Profile
 from simbase.errors import P2osError
 from tests.p2os.client.client_rig import MS, Rig, free_pioneer, new_pioneer
-from tests.tools.approved import Trace, judge_of, said
+from tests.tools.approved import Trace, judge_of, refusal, said
 
 USUAL = ClientSettings()
 WORDS = ("stop-button", "wheel-blocked left", "bumper front 2", "line-noise 0.002", "low-battery 10.9")
 
 
-def one_act(draw: random.Random, rig: Rig, goals: list[MotionGoal]) -> None:
+def one_act(draw: random.Random, rig: Rig, goals: list[MotionGoal]) -> None:  # noqa: C901, PLR0912 - a table of acts
     """Do one thing that a program, its user or the world may do."""
     core, now = rig.core, rig.now
     match draw.randrange(22):
@@ -69,7 +69,7 @@ def life(draw: random.Random, rig: Rig, acts: int) -> Iterator[str]:
         try:
             one_act(draw, rig, goals)
         except P2osError as error:
-            yield f"{type(error).__name__}: {error} {error.hint}"
+            yield refusal(error)
         (rig.living if draw.random() < 0.7 else rig.run)(draw.choice((0.02, 0.15, 0.4, 1.1)))
         yield said([(at // MS, command.number, command.argument) for at, command in rig.sent[since:]])
         yield said([item for item in rig.news[heard:] if item in rig.notices() or item is rig.states[-1]])
@@ -79,7 +79,11 @@ def life(draw: random.Random, rig: Rig, acts: int) -> Iterator[str]:
 
 
 def walk_of(
-    make: Callable[[], Pioneer], acts: int, chosen: ClientSettings = USUAL, wire: str = "perfect", baud: int | None = None
+    make: Callable[[], Pioneer],
+    acts: int,
+    chosen: ClientSettings = USUAL,
+    wire: str = "perfect",
+    baud: int | None = None,
 ) -> Trace:
     return lambda draw: life(draw, Rig(settings=chosen, wire=wire, seed=3, baud=baud, pioneer=make()), acts)
 

@@ -60,7 +60,11 @@ def numbers_of(value: object) -> list[float]:
         return [99.0 if math.isinf(value) else float(value)]
     if isinstance(value, BodyState | Obstacle):
         return numbers_of(astuple(value))
-    return [each for item in value for each in numbers_of(item)] if isinstance(value, Sequence | Iterable) and not isinstance(value, str) else []
+    return (
+        [each for item in value for each in numbers_of(item)]
+        if isinstance(value, Sequence | Iterable) and not isinstance(value, str)
+        else []
+    )
 
 
 def looks(body: RobotBody) -> list[float]:
@@ -117,7 +121,9 @@ def main() -> int:
         f"{engine}, {case}": [[round(each, 4) for each in look] for look in shown(engine, case)]
         for engine in engines() if engine != "kinematic" for case in CASES
     }  # fmt: skip
-    APPROVED.write_text(json.dumps(found, indent=0).replace("\n", " ").replace("] ],", "] ],\n") + "\n", encoding="utf-8")
+    APPROVED.write_text(
+        json.dumps(found, indent=0).replace("\n", " ").replace("] ],", "] ],\n") + "\n", encoding="utf-8"
+    )
     return 0
 
 
