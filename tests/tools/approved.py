@@ -1,8 +1,8 @@
 """What programs have shown when somebody looked at it: checksums of traces, line by line, which tests hold them to.
 
-    python -m tests.tools.approved tests/p2os/pioneer/world/walks/test_*.py            names the lines that are otherwise
-    python -m tests.tools.approved tests/p2os/…/test_*.py --write FOLDER               writes every trace, a file each
-    python -m tests.tools.approved tests/p2os/…/test_*.py --approve                    takes what they show now for right
+    python -m tests.tools.approved tests/p2os/…/walks/test_*.py            names the traces that are otherwise
+    python -m tests.tools.approved tests/p2os/…/walks/test_*.py --write D  writes every trace into a folder
+    python -m tests.tools.approved tests/p2os/…/walks/test_*.py --approve  takes what they show now for right
 
 A file of tests has a table of traces, `TRACES`, and the test `judge_of(__file__, TRACES)`; `approved.json` beside it
 keeps the checksums. A change that is meant changes traces too: write them before and behind it, read the difference
@@ -22,6 +22,8 @@ from enum import Enum
 from pathlib import Path
 
 import pytest
+
+from simbase.errors import P2osError
 
 #: Draws what is tried, and returns what is seen, a line of text each.
 Trace = Callable[[random.Random], Iterable[str]]
@@ -56,12 +58,18 @@ def tried(action: Callable[..., object], *arguments: object, **named: object) ->
     """Return what an action gives, or by which words it refuses."""
     try:
         return said(action(*arguments, **named))
-    except (ValueError, LookupError, TypeError, OSError, ArithmeticError) as error:
-        return f"{type(error).__name__}: {error} {getattr(error, 'hint', '')}".rstrip()
-    except Exception as error:
-        if hasattr(error, "hint"):  # a refusal of ours
-            return f"{type(error).__name__}: {error} {error.hint or ''}".rstrip()
-        raise
+    except (P2osError, ValueError, LookupError, TypeError, ArithmeticError) as error:
+        return refusal(error)
+
+
+def refusal(error: Exception) -> str:
+    """Return the words of an error, without those that another version of Python has for its own."""
+    words, cause = f"{type(error).__name__}: {error}", error.__cause__
+    if cause is not None and not isinstance(cause, P2osError):
+        for part in (str(cause), str(cause).partition(" (at ")[0], str(cause).partition(":")[0]):
+            words = words.replace(part, "…") if part else words
+    hint = getattr(error, "hint", None)
+    return f"{words} ({hint})" if hint else words
 
 
 def judge_of(file: str, traces: Mapping[str, Trace]) -> Callable[..., None]:
@@ -72,7 +80,9 @@ def judge_of(file: str, traces: Mapping[str, Trace]) -> Callable[..., None]:
         lines, right = _lines(name, traces[name]), _approved(Path(file)).get(name, ())
         for number, (line, checksum) in enumerate(zip(lines, right, strict=False)):
             if _checksum(line) != checksum:
-                pytest.fail(f"{name}, line {number} is otherwise than approved; now it is\n  {line[:SHOWN]}\n{_hint(file)}")
+                pytest.fail(
+                    f"{name}, line {number} is otherwise than approved; now it is\n  {line[:SHOWN]}\n{_hint(file)}"
+                )
         assert len(lines) == len(right), _hint(file)
 
     return judged

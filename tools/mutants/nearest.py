@@ -81,7 +81,11 @@ class Nearest:
         if not ran:  # run by an import, if at all: who imports it may look at what it has made, and run no line of it
             return tuple([*by_name, *sorted({*files} & {*self._tests} - {*by_name})][:MOST_FILES])
         near = [name for name in by_name if name in ran]
-        known = [*near, *sorted(ran - {*near})][: MOST_FILES - NOT_COUNTED]
+        mirror = f"tests/{path.rpartition('/')[0]}"
+        others = sorted(
+            ran - {*near}, key=lambda name: (WHOLE not in _words(name), _apart(mirror, _folder(name)), name)
+        )
+        known = [*near, *others][: MOST_FILES - NOT_COUNTED]
         # What was written since the suite was counted is known by its imports alone.
         return (*known, *[name for name in by_name if name not in known][:NOT_COUNTED])
 
@@ -91,21 +95,26 @@ class Nearest:
 
     def _distance(self, path: str, module: str, test: str) -> tuple[int, ...] | None:
         """Return how far a file of tests stands from a module: its mirror, its folder, who imports it."""
-        stem, folder = Path(path).stem, f"tests/{path.rpartition('/')[0]}"
+        stem, folder, its_folder = Path(path).stem, f"tests/{path.rpartition('/')[0]}", _folder(test)
         imported = self._imported_by(test)
         words = _words(test)
-        apart = _apart(folder, test.rpartition("/")[0])
+        apart = _apart(folder, its_folder)
         mirrors = bool({*stem.split("_")} <= words)
         does_import = any(name == module or name.startswith(f"{module}.") for name in imported)
         if mirrors and (does_import or apart <= 1 or test.startswith(f"{folder}/")):
             return 0, WHOLE not in words, apart
-        if does_import:
-            return 1, not {*stem.split("_")} & words, apart
+        # Walks go through all that the folder above them has.
+        is_walk = WHOLE in words and f"{folder}/".startswith(f"{its_folder.removesuffix(f'/{WHOLE}')}/")
+        if does_import or is_walk:
+            return 1, not is_walk and not {*stem.split("_")} & words, apart
         package = module.rpartition(".")[0]
         if apart <= 1 and any(name == package or name.startswith(f"{package}.") for name in imported):
             return 2, not {*stem.split("_")} & words, apart
         if any(name == package or name.startswith(f"{package}.") for name in imported):
             return 3, apart
+        above = package.rpartition(".")[0]  # what is loaded by a name is imported by nobody
+        if "." in above and apart <= 1 and any(name.startswith(f"{above}.") for name in imported):
+            return 4, package.rpartition(".")[2] not in words, apart
         return None
 
     def _imported_by(self, test: str) -> frozenset[str]:
@@ -162,6 +171,10 @@ def _ordered(distances: Mapping[str, tuple[int, ...] | None]) -> list[str]:
 @cache
 def _words(test: str) -> frozenset[str]:
     return frozenset(word for part in Path(test).with_suffix("").parts[1:] for word in part.split("_"))
+
+
+def _folder(test: str) -> str:
+    return test.rpartition("/")[0]
 
 
 def _apart(one: str, other: str) -> int:

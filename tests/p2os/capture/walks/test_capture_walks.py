@@ -136,7 +136,9 @@ def views(draw: random.Random) -> Iterator[str]:
         yield said(tracks.recording.full_header)
         for pixels, listed_rows in ((1000, 1000), (4, 5)):
             for frame in tracks.recording.frames(pixels, listed_rows):
-                yield said((frame.kind.name, frame.from_ns, frame.to_ns, frame.of, int(frame.flags), len(frame.to_bytes())))
+                yield said(
+                    (frame.kind.name, frame.from_ns, frame.to_ns, frame.of, int(frame.flags), len(frame.to_bytes()))
+                )
                 yield said([[*column][:40] for column in frame.columns])
 
 
@@ -151,7 +153,17 @@ def replays(draw: random.Random) -> Iterator[str]:
             if due is None:
                 replay.receive(Command(draw.randrange(3)).to_frame().to_bytes(), now)
             replay.advance_to(now)
-            yield said((now, due, replay.take_output(), replay.frames_left, replay.awaited, replay.waited(now), replay.is_closed))
+            yield said(
+                (
+                    now,
+                    due,
+                    replay.take_output(),
+                    replay.frames_left,
+                    replay.awaited,
+                    replay.waited(now),
+                    replay.is_closed,
+                )
+            )
 
 
 TRACES: dict[str, Trace] = {each.__name__: each for each in (vectors, sessions, formats, tables, views, replays)}

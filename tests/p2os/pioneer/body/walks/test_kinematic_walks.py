@@ -1,4 +1,4 @@
-"""Robots of the exact body, driven at random among things that come, go, walk and are pushed, against what was approved."""
+"""Robots of the exact body, driven at random among things that come, go, walk and are pushed, as approved."""
 
 import math
 import random
@@ -93,7 +93,9 @@ def together(draw: random.Random) -> Iterator[str]:
                   for number in range(count)]  # fmt: skip
         scene = make_scene("kinematic", world, MODELS[:count], starts)
         for number in range(20):
-            asked = [draw.choice(((draw.choice(SPEEDS),) * 2, (0.1, 0.3), (0.0, 0.2), (0.3, 0.3))) for _ in range(count)]
+            asked = [
+                draw.choice(((draw.choice(SPEEDS),) * 2, (0.1, 0.3), (0.0, 0.2), (0.3, 0.3))) for _ in range(count)
+            ]
             for _ in range(draw.choice((10, 250))):
                 wheels = scene.step(asked)
             yield said([*wheels])

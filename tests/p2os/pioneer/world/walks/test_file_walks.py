@@ -1,4 +1,4 @@
-"""Files of other programs, sound and spoilt, as worlds; and worlds and robots as files for other programs, as approved."""
+"""Files of other programs, sound and spoilt, as worlds; worlds and robots as their files; as approved."""
 
 import json
 import random
@@ -20,7 +20,7 @@ from tests.p2os.pioneer.world import test_importers_maps as maps
 from tests.p2os.pioneer.world import test_importers_meshes as meshes
 from tests.p2os.pioneer.world import test_importers_xml as xml
 from tests.p2os.pioneer.world.walks.things import drawn_world
-from tests.tools.approved import Trace, judge_of, rounded, said, tried
+from tests.tools.approved import Trace, judge_of, refusal, rounded, said, tried
 
 _NUMBER = re.compile(r"(?<![\w#.])-?\d+(?:\.\d+)?(?![\w.])")
 NUMBERS = ("0", "1", "-1", "2", "0.5", "3", "1000", "1e9", "90", "x", "")
@@ -49,7 +49,7 @@ def seen(folder: Path, name: str, data: str | bytes) -> Iterator[str]:
     try:
         world = load_world(folder / name)
     except WorldError as error:
-        yield f"{error} {error.hint}".replace(str(folder), "…")
+        yield refusal(error).replace(str(folder), "…")
         return
     yield rounded(write_world(world)).replace(str(folder), "…")
     yield said((world.skipped, world.marks, world.start, world.extent))
@@ -159,12 +159,12 @@ def transforms(draw: random.Random) -> Iterator[str]:
 
 
 TRACES: dict[str, Trace] = {
-    "aria": walk_of("a.map", maps.ARIA, 60),
-    "sdf": walk_of("a.sdf", xml.SDF, 50),
-    "urdf": walk_of("a.urdf", xml.URDF, 50),
+    "aria": walk_of("a.map", maps.ARIA, 40),
+    "sdf": walk_of("a.sdf", xml.SDF, 36),
+    "urdf": walk_of("a.urdf", xml.URDF, 36),
     "gltf": walk_of("a.gltf", json.dumps(gltf.document(), indent=1), 50),
     "dae": walk_of("a.dae", meshes.dae(meshes.WEDGE_Y_UP, node="<scale>2 1 1</scale><rotate>0 0 1 30</rotate>"), 50),
-    "obj": walk_of("a.obj", meshes.obj(meshes.WEDGE_Y_UP), 40),
+    "obj": walk_of("a.obj", meshes.obj(meshes.WEDGE_Y_UP), 30),
     "stl": walk_of("a.stl", meshes.stl_text(meshes.WEDGE), 30),
     **({"occupancy": walk_of("map.yaml", maps.YAML, 24)} if find_spec("PIL") and find_spec("yaml") else {}),
     **{each.__name__: each for each in (worlds, exported, polygons, transforms)},

@@ -79,7 +79,7 @@ def footprints(draw: random.Random) -> Iterator[str]:
         yield said((geometry.hull_polygon(robot.body), geometry.wheel_polygons(robot)))
 
 
-def plans(draw: random.Random) -> Iterator[str]:
+def plans(draw: random.Random) -> Iterator[str]:  # noqa: C901 - a table of acts
     for robot in (P2DX, PATROLBOT):
         for _ in range(8):
             world = drawn_world(draw)
@@ -119,7 +119,9 @@ def pictures(draw: random.Random) -> Iterator[str]:
             yield drawing.text_key(world, columns)
     for name in ("office", "walkway"):
         yield drawing.svg(load_world(name, 1), side_px=300)
-    yield said([drawing.grid_step(span) for span in (0.3, 0.99, 1.0, 1.01, 4.9, 5.0, 9.9, 10.0, 10.1, 20.0, 51.0, 100.0)])
+    yield said(
+        [drawing.grid_step(span) for span in (0.3, 0.99, 1.0, 1.01, 4.9, 5.0, 9.9, 10.0, 10.1, 20.0, 51.0, 100.0)]
+    )
     yield said([drawing.ticks(-1.0, 1.0, 0.5), drawing.ticks(-0.9, 1.1, 0.5)])
 
 

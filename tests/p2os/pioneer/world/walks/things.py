@@ -37,7 +37,9 @@ def drawn_thing(draw: random.Random, name: str) -> Obstacle:
         case 2:
             return Obstacle(name=name, **place, **flat, kind=draw.choice((ObstacleKind.FLOOR, ObstacleKind.RAMP)))
         case 3:
-            return Obstacle(name=name, **place, **size, fixed=True, kind=draw.choice((ObstacleKind.WALL, ObstacleKind.RAIL)))
+            return Obstacle(
+                name=name, **place, **size, fixed=True, kind=draw.choice((ObstacleKind.WALL, ObstacleKind.RAIL))
+            )
         case 4:
             return Obstacle(name=name, **place | {"height_m": 0.01}, **size, fixed=draw.random() < 0.5)
     return Obstacle(name=name, **place, **size)
