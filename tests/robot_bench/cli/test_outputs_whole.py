@@ -13,10 +13,9 @@ from robot_bench.events.codec import line_of
 from robot_bench.events.kinds import PinEdge
 from tests.bluepill_sim.analysis.waveforms.captures import Analyser, random_run, seen, with_edges
 from tests.robot_bench.cli.test_compare_pins import vcd
-from tests.robot_bench.kept_lines import is_as_kept
-from tests.robot_bench.long_run import META, MORE, long_run
+from tests.robot_bench.recording.kept_lines import is_as_kept
+from tests.robot_bench.recording.long_run import META, MORE, long_run
 
-HERE = Path(__file__).parent
 LONG = re.compile(r"-?\d+\.\d{9,}(e-?\d+)?")
 
 
@@ -55,7 +54,7 @@ def test_two_ways_compared(capsys: pytest.CaptureFixture[str]) -> None:
         "compare a.csv b.csv --at moves --align none", "compare a.csv c.csv --json",
         "compare a.csv b.csv --poses truth",
     )  # fmt: skip
-    assert is_as_kept(lines, HERE / "outputs_of_compare.txt")
+    assert is_as_kept(lines, "outputs_of_compare")
 
 
 def test_figures_of_a_run(capsys: pytest.CaptureFixture[str]) -> None:
@@ -66,7 +65,7 @@ def test_figures_of_a_run(capsys: pytest.CaptureFixture[str]) -> None:
     end = {"k": "end", "passed": False, "goals_met": ["a"], "failures": ["b: missed"], "min_clearance_m": 0.3}
     Path("run/trace.jsonl").write_text("\n".join([json.dumps(meta), *body, json.dumps(end), ""]), encoding="utf-8")
     lines = said(capsys, "metrics run", "metrics run run", "explain run", "explain run --json")
-    assert is_as_kept(lines, HERE / "outputs_of_a_run.txt")
+    assert is_as_kept(lines, "outputs_of_a_run")
 
 
 def test_pins_compared(capsys: pytest.CaptureFixture[str]) -> None:
@@ -89,4 +88,4 @@ def test_pins_compared(capsys: pytest.CaptureFixture[str]) -> None:
             "less.vcd --rate 24MHz", "late.vcd --rate 24MHz --json", "board.vcd --wire PA9=PA0", "missing.vcd",
         )
     ))  # fmt: skip
-    assert is_as_kept(lines, HERE / "outputs_of_pins.txt")
+    assert is_as_kept(lines, "outputs_of_pins")

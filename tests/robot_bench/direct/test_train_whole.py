@@ -1,13 +1,11 @@
 """A drive train driven through all that a bridge does: speeds, currents and aims of each stage, as they are kept."""
 
-from pathlib import Path
-
 import pytest
 
 from robot_bench.direct.differential.bridge import Shares
 from robot_bench.direct.differential.drive_train import DriveTrain, box_inertia, no_load_radps
 from tests.robot_bench.direct.robots import rover
-from tests.robot_bench.kept_lines import is_as_kept
+from tests.robot_bench.recording.kept_lines import is_as_kept
 
 STAGES = [
     (Shares(0.6, 0, 0.4), Shares(0.5, 0.1, 0)), (Shares(0, 0.7, 0), Shares(1, 0, 0)),
@@ -32,7 +30,7 @@ def test_a_train_through_its_stages() -> None:
                 for _ in range(40):
                     done = train.step(left, right, supply)
                 lines += [shown(*done, train.left_radps, train.right_radps, train.kinetic_j)]
-    assert is_as_kept(lines, Path(__file__).with_name("train_whole.txt"))
+    assert is_as_kept(lines, "train_whole")
 
 
 @pytest.mark.parametrize("speed", [0.0, 5.0, -5.0])

@@ -3,7 +3,6 @@
 import hashlib
 import random
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 
@@ -18,10 +17,9 @@ from robot_bench.experiments.fitting.sonar import fit_sonar, walls_of
 from robot_bench.experiments.fitting.umbmark import umbmark
 from robot_bench.experiments.fitting.wheels import fit_wheels
 from tests.robot_bench.experiments.synthetic_robots import WALLS, Planted, drive
-from tests.robot_bench.kept_lines import is_as_kept
+from tests.robot_bench.recording.kept_lines import is_as_kept
 
 P2DX = load_parameters("p2dx")
-HERE = Path(__file__)
 
 
 def lines_of(name: str, found: Fit) -> Iterator[str]:
@@ -37,7 +35,7 @@ def test_what_fits_make_of_a_drive() -> None:
     driven = drive(P2DX, robot, source, 30.0)
     lines = [*lines_of("wheels", fit_wheels([driven])), *lines_of("ramps", fit_ramps([driven])),
              *lines_of("sonar", fit_sonar([driven], WALLS))]  # fmt: skip
-    assert is_as_kept(lines, HERE.with_name("fits_of_a_drive.txt"))
+    assert is_as_kept(lines, "fits_of_a_drive")
 
 
 def square_of(clockwise: bool, off: float, steps: int = 200) -> Drive:
@@ -62,7 +60,7 @@ def test_what_squares_come_to() -> None:
         *(f"{name} {[f'{value:.5g}' for value in values.values()]}" for name, values in plain.items()),
         *(f"{name} {is_clockwise} {x:.5g} {y:.5g}" for name, is_clockwise, x, y in rows),
     ]
-    assert is_as_kept(lines, HERE.with_name("fits_of_squares.txt"))
+    assert is_as_kept(lines, "fits_of_squares")
 
 
 def test_what_an_example_is_made_of() -> None:
@@ -82,4 +80,4 @@ def test_what_an_example_is_made_of() -> None:
         f"{len(walls_of(load_world('room'), P2DX))}",
     ]
     lines += [" ".join(f"{value:.5g}" for value in row) for row in walls_of(load_world("arena"), P2DX)[::9]]
-    assert is_as_kept("\n".join(lines).splitlines(), HERE.with_name("fits_examples.txt"))
+    assert is_as_kept("\n".join(lines).splitlines(), "fits_examples")

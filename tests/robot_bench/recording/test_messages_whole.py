@@ -2,11 +2,10 @@
 
 import hashlib
 import json
-from pathlib import Path
 
 from robot_bench.recording.scene_messages import Message, SceneMessages, topics
-from tests.robot_bench.kept_lines import is_as_kept
-from tests.robot_bench.long_run import META, MORE, long_run
+from tests.robot_bench.recording.kept_lines import is_as_kept
+from tests.robot_bench.recording.long_run import META, MORE, long_run
 
 
 def plain(message: Message) -> str:
@@ -29,4 +28,4 @@ def test_the_messages_of_a_long_run() -> None:
         said = [f"{one.schema} {one.t} {plain(one)}" for one in messages]
         whole = hashlib.sha256("\n".join(said).encode()).hexdigest()[:16]
         lines += [f"{topic}: {len(said)} {whole}", *(f"  {one[:1500]}" for one in said[:2])]
-    assert is_as_kept(lines, Path(__file__).with_name("messages_of_a_long_run.txt"))
+    assert is_as_kept(lines, "messages_of_a_long_run")

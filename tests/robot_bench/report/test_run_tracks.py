@@ -2,7 +2,6 @@
 
 import hashlib
 from collections.abc import Iterator
-from pathlib import Path
 
 from p2os.view.header import PageHeader
 from p2os.view.recording import ChannelTrack, ViewRecording
@@ -12,8 +11,8 @@ from robot_bench.events.kinds import (
 )
 from robot_bench.view.run_tracks import RunTracks
 from robot_bench.wires.edges import Edges
-from tests.robot_bench.kept_lines import is_as_kept
-from tests.robot_bench.long_run import META, MORE, long_run
+from tests.robot_bench.recording.kept_lines import is_as_kept
+from tests.robot_bench.recording.long_run import META, MORE, long_run
 from tests.robot_bench.recording.records import S
 
 
@@ -48,4 +47,4 @@ def test_the_channels_of_a_long_run() -> None:
     for event in MORE[2:5]:
         bare.take(event)
     lines += [str(bare.recording.header), *(line for track in bare.recording.tracks for line in lines_of(track))]
-    assert is_as_kept(lines, Path(__file__).with_name("run_tracks.txt"))
+    assert is_as_kept(lines, "run_tracks")

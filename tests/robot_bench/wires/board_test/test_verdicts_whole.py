@@ -1,17 +1,15 @@
 """Every verdict on a wire, by what it did when it was driven; and the voltages of a board with each fault."""
 
 import itertools
-from pathlib import Path
 
 from adapter_sim.pinout import load_pinout
 from robot_bench.wires.board_test.circuit import BoardFault, Circuit, Side, VoltageSource, WireFault
 from robot_bench.wires.board_test.verdicts import judge
 from robot_bench.wires.board_test.walk import PATTERN, BoardMeasurement, Response
-from tests.robot_bench.kept_lines import is_as_kept
+from tests.robot_bench.recording.kept_lines import is_as_kept
 
 PINOUT = load_pinout()
 NAMES = [wire.name for wire in PINOUT.wires]
-HERE = Path(__file__)
 
 
 def word(*names: str) -> int:
@@ -66,7 +64,7 @@ def test_what_wires_are_found_to_be() -> None:
         ):
             response = Response(near_wrong=near, far_wrong=far, held_at=held, pulled=pulled)
             lines += rows(measured(wires=sound() | {name: response}), name)
-    assert is_as_kept(lines, HERE.with_name("verdicts_of_wires.txt"))
+    assert is_as_kept(lines, "verdicts_of_wires")
 
 
 def test_voltages_of_a_board_with_each_fault() -> None:
@@ -80,4 +78,4 @@ def test_voltages_of_a_board_with_each_fault() -> None:
                 shown = [f"{node[0]}/{node[1]} {value:.4f}" for node, value in sorted(pads.items(), key=str)
                          if abs(value - idle[node]) > 1e-6]  # fmt: skip
                 lines.append(f"{kind.value} {name} {other} {side}, {volts} at {end}: {', '.join(shown)}")
-    assert is_as_kept(lines, HERE.with_name("verdicts_of_voltages.txt"))
+    assert is_as_kept(lines, "verdicts_of_voltages")

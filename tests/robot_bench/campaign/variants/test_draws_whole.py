@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from pathlib import Path
 
 import pytest
 
@@ -10,9 +9,7 @@ from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import Pose
 from robot_bench.campaign.search import SEARCHES, PointResult, Problem
 from robot_bench.campaign.things import KINDS, DrawnThing, Room
-from tests.robot_bench.kept_lines import is_as_kept
-
-HERE = Path(__file__)
+from tests.robot_bench.recording.kept_lines import is_as_kept
 
 
 def test_where_things_of_each_kind_stand() -> None:
@@ -28,7 +25,7 @@ def test_where_things_of_each_kind_stand() -> None:
             for turn in range(2) for n, kind in enumerate(KINDS)
         ]  # fmt: skip
         lines += [f"free {free_m}, apart {gap_m}", *map(str, room.tables(things))]
-    assert is_as_kept(lines, HERE.with_name("draws_of_things.txt"))
+    assert is_as_kept(lines, "draws_of_things")
 
 
 def told(points: Sequence[tuple[float, ...]]) -> list[PointResult]:
@@ -54,4 +51,4 @@ def test_which_points_a_search_proposes(name: str) -> None:
                 points = search.ask(5)
                 lines += [f"  {' '.join(f'{at:.4f}' for at in point)} {search.is_drawn(point)}" for point in points]
                 search.tell(told(points))
-    assert is_as_kept(lines, HERE.with_name(f"draws_of_{name}.txt"))
+    assert is_as_kept(lines, f"draws_of_{name}")

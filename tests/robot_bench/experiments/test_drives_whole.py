@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from robot_bench.drives.of_run import drive_of_record
 from robot_bench.drives.onsets import answers
 from robot_bench.events.kinds import Clearance, Contact, Verdict
 from tests.robot_bench.experiments.validation.test_validation_findings import WANTED, MadeRun, nominal_of
-from tests.robot_bench.kept_lines import is_as_kept
+from tests.robot_bench.recording.kept_lines import is_as_kept
 from tests.robot_bench.recording.records import S
 
 SEEN = [("DD1", 1.9, 2.2), ("DD3", 2.85, 2.95), ("DD4", 5.1, 5.9), ("DD4", 7.6, 7.7)]
@@ -62,7 +61,7 @@ def test_what_a_run_tells_of_its_drive() -> None:
     lines = []
     for name, one in (("a run", record), ("at a port", remote), ("without packets", bare)):
         lines += [name, *lines_of(drive_of_record(name, one))]
-    assert is_as_kept(lines, Path(__file__).with_name("drives_of_runs.txt"))
+    assert is_as_kept(lines, "drives_of_runs")
 
 
 def test_a_short_drive_and_how_pings_lie_before_their_packet() -> None:
@@ -73,4 +72,4 @@ def test_a_short_drive_and_how_pings_lie_before_their_packet() -> None:
     assert (found.mean_square_jerk_m2_s6, found.log_dimensionless_jerk, found.max_rim_mps2) == (None, None, 2.0)
     assert (found.contacts, found.energy_j, found.clearance_m, found.time_to_goal_s) == (None, None, None, None)
     rows = [(readings, fitted, since) for readings in (0, 1, 2, 8) for fitted in (8, 16) for since in (0.05, 0.1, 9.0)]
-    assert is_as_kept([f"{row} {spread_s(*row):.6g}" for row in rows], Path(__file__).with_name("drives_pings.txt"))
+    assert is_as_kept([f"{row} {spread_s(*row):.6g}" for row in rows], "drives_pings")
