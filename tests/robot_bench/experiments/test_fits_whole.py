@@ -3,7 +3,6 @@
 import hashlib
 import random
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 
@@ -12,16 +11,16 @@ from p2os.pioneer.world import load_world
 from p2os.robots.parameters import load_parameters
 from robot_bench.drives.drive import Drive, Trajectory
 from robot_bench.experiments.fitting import examples
-from robot_bench.experiments.fitting.least_squares import Fit
+from robot_bench.experiments.fitting.least_squares import Estimate, Fit
 from robot_bench.experiments.fitting.ramps import fit_ramps
+from robot_bench.experiments.fitting.robot_files import errors_text, robot_text
 from robot_bench.experiments.fitting.sonar import fit_sonar, walls_of
 from robot_bench.experiments.fitting.umbmark import umbmark
 from robot_bench.experiments.fitting.wheels import fit_wheels
 from tests.robot_bench.experiments.synthetic_robots import WALLS, Planted, drive
-from tests.robot_bench.kept_lines import is_as_kept
+from tests.robot_bench.recording.kept_lines import is_as_kept
 
 P2DX = load_parameters("p2dx")
-HERE = Path(__file__)
 
 
 def lines_of(name: str, found: Fit) -> Iterator[str]:
@@ -35,9 +34,9 @@ def test_what_fits_make_of_a_drive() -> None:
     source = random.Random(12)
     robot = Planted.drawn(source)
     driven = drive(P2DX, robot, source, 30.0)
-    lines = [*lines_of("wheels", fit_wheels([driven])), *lines_of("ramps", fit_ramps([driven])),
-             *lines_of("sonar", fit_sonar([driven], WALLS))]  # fmt: skip
-    assert is_as_kept(lines, HERE.with_name("fits_of_a_drive.txt"))
+    fits = {"wheels": fit_wheels([driven]), "ramps": fit_ramps([driven]), "sonar": fit_sonar([driven], WALLS)}
+    lines = [line for name, found in fits.items() for line in lines_of(name, found)]
+    assert is_as_kept(lines, "fits_of_a_drive")
 
 
 def square_of(clockwise: bool, off: float, steps: int = 200) -> Drive:
@@ -62,7 +61,7 @@ def test_what_squares_come_to() -> None:
         *(f"{name} {[f'{value:.5g}' for value in values.values()]}" for name, values in plain.items()),
         *(f"{name} {is_clockwise} {x:.5g} {y:.5g}" for name, is_clockwise, x, y in rows),
     ]
-    assert is_as_kept(lines, HERE.with_name("fits_of_squares.txt"))
+    assert is_as_kept(lines, "fits_of_squares")
 
 
 def test_what_an_example_is_made_of() -> None:
@@ -82,4 +81,14 @@ def test_what_an_example_is_made_of() -> None:
         f"{len(walls_of(load_world('room'), P2DX))}",
     ]
     lines += [" ".join(f"{value:.5g}" for value in row) for row in walls_of(load_world("arena"), P2DX)[::9]]
-    assert is_as_kept("\n".join(lines).splitlines(), HERE.with_name("fits_examples.txt"))
+    assert is_as_kept("\n".join(lines).splitlines(), "fits_examples")
+
+
+def test_what_is_written_of_a_fit() -> None:
+    names = ("track_mm", "accel_mm_s2", "rot_decel_deg_s2", "cone_deg", "left_wheel", "right_wheel", "noise_m",
+             "command_delay_s", "turn_gain")  # fmt: skip
+    found = {name: Estimate(name=name, value=n + 1.23456, low=n + 1.0, high=n + 1.5) for n, name in enumerate(names)}
+    lines = []
+    for kept in (found, {"left_wheel": found["left_wheel"], "noise_m": found["noise_m"]}, {}):
+        lines += robot_text("p2dx", P2DX, kept).split("\n") + errors_text(P2DX, kept).split("\n")
+    assert is_as_kept(lines, "fits_written")

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 
 import pytest
 
@@ -11,7 +10,7 @@ from robot_bench.recording.run_record import RunRecord
 from robot_bench.report.explain.contact import ContactAnalysis
 from robot_bench.report.explain.probing import Codes, InputEffect, SensorResponse
 from robot_bench.report.explain.scene import Scene
-from tests.robot_bench.kept_lines import is_as_kept
+from tests.robot_bench.recording.kept_lines import is_as_kept
 from tests.robot_bench.recording.records import S
 from tests.robot_bench.report.programs_asked import AHEAD, AskedProber, AskedReplay, answers, driven_run, poses, told
 
@@ -158,7 +157,7 @@ def program(case: Case, record: RunRecord) -> AskedProber:
 
 
 def test_each_link_that_did_not_hold_is_the_cause() -> None:
-    kept = Path(__file__).with_name("explained_contact.txt")
+    kept = "explained_contact"
     lines = []
     for case in CASES:
         record = run_of(case)

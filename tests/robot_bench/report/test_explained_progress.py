@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -16,7 +15,7 @@ from robot_bench.report.explain.progress import ProgressAnalysis
 from robot_bench.report.explain.replay import ChipReset, SourcePlace
 from robot_bench.report.explain.scene import Scene
 from robot_bench.wires.edges import Edges
-from tests.robot_bench.kept_lines import is_as_kept
+from tests.robot_bench.recording.kept_lines import is_as_kept
 from tests.robot_bench.recording.records import S
 from tests.robot_bench.report.programs_asked import (
     AHEAD,
@@ -165,7 +164,7 @@ def test_each_link_that_keeps_a_robot_where_it_is() -> None:
         lines += said(case, case.prober(record), record)
     lines += [line for name in ("it never begins", "the program itself", "it spins") for case in CASES
               if case.name == name for line in said(case, None, case.record())]  # fmt: skip
-    assert is_as_kept(lines, Path(__file__).with_name("explained_progress.txt"))
+    assert is_as_kept(lines, "explained_progress")
 
 
 def failing(failure: str, **changes: object) -> tuple[RunRecord, str]:
@@ -205,7 +204,7 @@ def test_what_else_fails_is_looked_into_by_its_kind() -> None:
         finding, steps = explaining._find(record, Scene(record), prober, failure)  # type: ignore[arg-type]
         lines += [f"{name}: {'cause' if finding.is_cause else 'known'}: {finding.says}", *told(steps)]
         lines += [f"    asked {one}" for one in prober.asked]
-    assert is_as_kept(lines, Path(__file__).with_name("explained_others.txt"))
+    assert is_as_kept(lines, "explained_others")
 
 
 @pytest.mark.parametrize("unnoticed", [(), ("DD1", "DD8")])

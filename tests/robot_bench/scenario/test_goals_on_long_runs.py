@@ -5,7 +5,6 @@ What a bound is and where a window ends is tested goal by goal; here is how all 
 
 import math
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -19,8 +18,8 @@ from robot_bench.events.kinds import (
 from robot_bench.scenario.goals.judging import GoalJudge, RunEnd, load_goal
 from robot_bench.scenario.goals.kinds import every_kind
 from robot_bench.scenarios import encoders, sensors
-from tests.robot_bench.kept_lines import is_as_kept
-from tests.robot_bench.long_run import LONG_S, long_run
+from tests.robot_bench.recording.kept_lines import is_as_kept
+from tests.robot_bench.recording.long_run import LONG_S, long_run
 from tests.robot_bench.recording.records import S
 
 GOALS: Mapping[str, list[dict[str, Any]]] = {
@@ -123,7 +122,7 @@ def test_each_goal_on_a_long_run(seed: int) -> None:
     assert GOALS.keys() == every_kind().keys()
     run = [*long_run(seed)]
     lines = [line for kind, tables in GOALS.items() for table in tables for line in judged(kind, table, run)]
-    assert is_as_kept(lines, Path(__file__).with_name(f"goals_on_long_run_{seed}.txt"))
+    assert is_as_kept(lines, f"goals_on_long_run_{seed}")
 
 
 def placed(t: float, sonar: int) -> Event:

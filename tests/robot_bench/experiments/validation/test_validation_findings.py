@@ -6,7 +6,6 @@ The runs are not quite right: pins come late, a speed is off, a thing is seen tw
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -38,7 +37,7 @@ from robot_bench.recording.run_record import RunRecord
 from robot_bench.scenario.goals.judging import Judgement
 from robot_bench.scenario.scenario import Scenario
 from robot_bench.wires.edges import Edges
-from tests.robot_bench.kept_lines import is_as_kept
+from tests.robot_bench.recording.kept_lines import is_as_kept
 from tests.robot_bench.recording.records import S, motor_pins
 
 MS = S // 1000
@@ -180,7 +179,7 @@ def lines_of(found: Sequence[Finding]) -> Iterator[str]:
 
 def is_kept(name: str, *found: Sequence[Finding]) -> bool:
     lines = [line for part in found for line in ("--", *lines_of(part))]
-    return is_as_kept(lines, Path(__file__).with_name(f"findings_{name}.txt"))
+    return is_as_kept(lines, f"findings_{name}")
 
 
 @pytest.mark.parametrize("mode", MODES)
@@ -273,4 +272,4 @@ def test_what_is_expected_of_each_pair_of_codes() -> None:
                 shown = [f"{value:.6g}" for value in (*nominal.speeds(pair), *nominal.rims_mm_s(pair))]
                 bounds = [*nominal.rounding_bounds(pair), nominal.speed_bound(pair), nominal.way_bound(pair, 90.0, 0.5)]
                 lines += [f"{pair} {shown}", *(f"  {one.name} {one.value:.6g} {one.formula}" for one in bounds)]
-    assert is_as_kept(lines, Path(__file__).with_name("findings_nominal.txt"))
+    assert is_as_kept(lines, "findings_nominal")

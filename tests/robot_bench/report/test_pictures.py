@@ -1,7 +1,6 @@
-"""Every picture that the bench draws, whole: each curve, mark, name and colour as it is kept beside this file."""
+"""Every picture that the bench draws, whole: each curve, mark, name and colour as it is kept."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,10 +17,9 @@ from robot_bench.report.plan import plan
 pytest.importorskip("matplotlib")
 from robot_bench.experiments.pictures import comparison_figure, effects_figure, latency_figure
 from robot_bench.report import edge_picture, plots
-from tests.robot_bench.kept_lines import is_as_kept
-from tests.robot_bench.pictures.drawn_figures import lines_of
+from tests.robot_bench.recording.kept_lines import is_as_kept
+from tests.robot_bench.report.drawn_figures import lines_of
 
-HERE = Path(__file__).parent
 P2DX = load_parameters("p2dx")
 
 
@@ -57,14 +55,14 @@ def run_of_all(**changes: object) -> Json:
 
 @pytest.mark.parametrize("name", ["path", "speeds", "pins"])
 def test_a_run(name: str) -> None:
-    assert is_as_kept(lines_of(getattr(plots, f"_{name}_figure")(run_of_all())), HERE / f"run_{name}.txt")
+    assert is_as_kept(lines_of(getattr(plots, f"_{name}_figure")(run_of_all())), f"picture_run_{name}")
 
 
 def test_a_run_that_never_began() -> None:
     empty = plan(extent=(-3.0, -3.0, 3.0, 3.0), poses=[], obstacles=[], changes=[], hits=[], duration_s=1e-6)
     bare = run_of_all(plan=empty, poses=[], obstacles=[], changes=[], hits=[], motors=[[], []], pins=[])
     for name in ("path", "speeds", "pins"):
-        assert is_as_kept(lines_of(getattr(plots, f"_{name}_figure")(bare)), HERE / f"empty_{name}.txt")
+        assert is_as_kept(lines_of(getattr(plots, f"_{name}_figure")(bare)), f"picture_empty_{name}")
 
 
 def compared(jump_s: float, **sensors: Steps) -> Drive:
@@ -83,12 +81,12 @@ def test_a_comparison(other: float, sensor: float | None, request: pytest.Fixtur
         one.sensors = {1: Steps(np.array([0.0]), np.array([0.0]))}
         two.sensors = {1: Steps(np.array([0.0, 1.0]), np.array([0.0, 1.0]))}
     found = compare(one, two, How(align="none"))
-    assert is_as_kept(lines_of(comparison_figure(found)), HERE / f"comparison_{request.node.callspec.id}.txt")
+    assert is_as_kept(lines_of(comparison_figure(found)), f"picture_comparison_{request.node.callspec.id}")
 
 
 def test_latencies() -> None:
     rows = [("line", [0.002, 0.001, 0.004]), ("whole", [0.120, 0.030])]
-    assert is_as_kept(lines_of(latency_figure("mine", rows)), HERE / "latency.txt")
+    assert is_as_kept(lines_of(latency_figure("mine", rows)), "picture_latency")
 
 
 def effect(key: str, alone: tuple[float, ...], *found: float | None) -> ParameterEffect:
@@ -106,7 +104,7 @@ WITH_INDICES = [
 @pytest.mark.parametrize("name", ["alone", "indices"])
 def test_effects(name: str) -> None:
     rows = {"alone": {"path_m": ALONE}, "indices": {"path_m": WITH_INDICES, "goal 1": WITH_INDICES[1:]}}[name]
-    assert is_as_kept(lines_of(effects_figure("mine", rows)), HERE / f"effects_{name}.txt")
+    assert is_as_kept(lines_of(effects_figure("mine", rows)), f"picture_effects_{name}")
 
 
 def met(pin: str, run: list[tuple[float, int]], capture: list[tuple[float, int]], *, added: tuple[int, ...] = (),
@@ -139,7 +137,7 @@ def pins_compared(unit_ns: float, first: str | None) -> PinComparison:
 @pytest.mark.parametrize(("unit_ns", "first"), [(1e3, "PA3"), (1e3, None), (2.0, "PA3"), (1e6, "PA1"), (1e9, None)])
 def test_edges_of_pins(unit_ns: float, first: str | None) -> None:
     figure = edge_picture._figure(pins_compared(unit_ns, first), "mine")
-    assert is_as_kept(lines_of(figure), HERE / f"edges_1e{math.log10(unit_ns):.0f}_{first}.txt")
+    assert is_as_kept(lines_of(figure), f"picture_edges_1e{math.log10(unit_ns):.0f}_{first}")
 
 
 def test_edges_of_many_pins_and_of_none() -> None:
@@ -152,5 +150,5 @@ def test_edges_of_many_pins_and_of_none() -> None:
         alignment=found.alignment, limits=found.limits, unjudged=0, miswired=[], unexplained=0, first=None,
         met=[met("PA0", [], [])],
     )  # fmt: skip
-    assert is_as_kept(lines_of(edge_picture._figure(many, "many")), HERE / "edges_many.txt")
-    assert is_as_kept(lines_of(edge_picture._figure(none, "none")), HERE / "edges_none.txt")
+    assert is_as_kept(lines_of(edge_picture._figure(many, "many")), "picture_edges_many")
+    assert is_as_kept(lines_of(edge_picture._figure(none, "none")), "picture_edges_none")
