@@ -15,7 +15,11 @@ from pathlib import Path
 
 import pytest
 
+from bluepill_sim import BluePill
 from bluepill_sim.__main__ import run
+from bluepill_sim.debug.execution import Execution
+from bluepill_sim.debug.gdb_session import GdbSession
+from bluepill_sim.debug.machine import LoneChip
 from tests.bluepill_sim.board.parts.test_attaching import ATTACHED
 from tests.bluepill_sim.board.parts.test_attaching import PROGRAM as PARTS
 from tests.tools.examples import EXAMPLES
@@ -81,6 +85,34 @@ def _shown(data: bytes) -> str:
     return f"{len(data)} bytes, SHA-256 {hashlib.sha256(data).hexdigest()}"
 
 
+#: What is said to `monitor` of GDB, one session; a number: the chip runs up to there, in ns.
+MONITOR = (
+    "help", "time", "blocks", "pins", "3000000", "time", "pins all", "pin pa9", "pin PA6 1", "pin PA6 z", "pin PA6 0",
+    "registers", "registers USART1", "registers RCC CFGR", "registers RCC NO", "registers NVIC", "snapshot",
+    "snapshot b", "wait 1ms", "time", "restore", "time", "restore c", "wait", "wait 3", "reset", "fault", "blocks",
+    "warnings", "tea", "registers TIM9", "pin", "pin PA4 2", "pin PA4 1 1",
+)  # fmt: skip
+
+
+def monitored() -> str:
+    """Return what the lines of `MONITOR` are answered."""
+    board = BluePill(EXAMPLES / "sensors.elf")
+    session = GdbSession(Execution(LoneChip(board), lambda _: None))
+    said = []
+    for line in MONITOR:
+        if line.isdigit():
+            board.advance_to(int(line))
+            said.append(f"# {board.now_ns} ns\n")
+        else:
+            answered = session.answer(b"qRcmd," + line.encode().hex().encode())
+            said.append(f"(gdb) monitor {line}\n{bytes.fromhex(answered.decode()).decode()}")
+    return "".join(said)
+
+
+def test_a_session_of_monitor_is_answered_as_it_was() -> None:
+    assert monitored() == (ANSWERS / "monitor.txt").read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize("name", VERBS)
 def test_a_verb_answers_as_it_did(name: str, tmp_path: Path) -> None:
     assert answer(VERBS[name], tmp_path) == (ANSWERS / f"{name}.txt").read_text(encoding="utf-8")
@@ -88,6 +120,7 @@ def test_a_verb_answers_as_it_did(name: str, tmp_path: Path) -> None:
 
 if __name__ == "__main__":
     ANSWERS.mkdir(exist_ok=True)
+    (ANSWERS / "monitor.txt").write_text(monitored(), encoding="utf-8")
     for each, line in VERBS.items():
         with tempfile.TemporaryDirectory() as place:
             (ANSWERS / f"{each}.txt").write_text(answer(line, Path(place)), encoding="utf-8")
