@@ -10,8 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from adapter_sim.codec import BitOrder
 from adapter_sim.masters import Master
-from adapter_sim.settings import AdapterSettings, BitOrder, EncoderAtOpen, MotorCommand, MotorMeaning
+from adapter_sim.settings import AdapterSettings, EncoderAtOpen, MotorCommand, MotorMeaning
 from p2os.gamepad import PadReport
 from p2os.protocol.sip import SonarReading
 from tests.adapter_sim.conftest import MS, FakeRobot, Rig
@@ -65,9 +66,10 @@ def padded(rig: Rig, robot: FakeRobot) -> None:
     rig.connect()
     rig.adapter.set_master(Master.PAD, rig.now)
     rig.ms(300)
-    reports = [PadReport(up=True), PadReport(forward=1023), PadReport(forward=500, turn=-512), PadReport(turn=300),
-               PadReport(backward=1023, turn=511), PadReport(forward=40, turn=30), PadReport(forward=30, backward=900),
-               PadReport(down=True, up=True), PadReport(up=True), PadReport(forward=700)]  # fmt: skip
+    reports = [PadReport(), PadReport(up=True), PadReport(forward=1023), PadReport(forward=500, turn=-512),
+               PadReport(turn=300), PadReport(backward=1023, turn=511), PadReport(forward=40, turn=30),
+               PadReport(forward=30, backward=900), PadReport(down=True, up=True), PadReport(), PadReport(up=True),
+               PadReport(forward=700)]  # fmt: skip
     for report in reports:
         for _ in range(20):
             rig.adapter.receive_pad(report, rig.now)
