@@ -1,5 +1,6 @@
 """The case: its solids, its fit with the board, and that its files are of this design."""
 
+import math
 import random
 from dataclasses import replace
 from importlib.util import find_spec
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 
 from hardware.case import __main__ as command
 from hardware.case import design, fit
+from hardware.case import picture as drawing
 from hardware.case.picture import draw, read_stl
 from hardware.case.solids import Block, PrintedPart, Solid, UprightCylinder
 
@@ -71,33 +73,50 @@ def shifted(body: PrintedPart, name: str, dx: float) -> PrintedPart:
 
 
 @pytest.mark.parametrize(
-    ("which", "change", "check"),
+    ("which", "change", "check", "said"),
     [
-        ("base", lambda body: without(body, "RS-232"), fit.plugs_reach_their_sockets),
-        ("base", lambda body: without(body, "USB"), fit.plugs_reach_their_sockets),
-        ("base", lambda body: shifted(body, "USB", 1.7), fit.plugs_reach_their_sockets),
-        ("base", lambda body: without(body, "12 V"), fit.plugs_reach_their_sockets),
-        ("base", lambda body: without(body, "5 V"), fit.plugs_reach_their_sockets),
-        ("base", lambda body: without(body, "boss"), fit.bosses_carry_the_board),
-        ("base", lambda body: shifted(body, "insert", 2.1), fit.bosses_carry_the_board),
-        ("base", lambda body: shifted(body, "boss", 10.0), fit.solder_keeps_off_the_base),
-        ("base", lambda body: shifted(body, "inside", 0.7), fit.parts_touch_nothing),
-        ("base", lambda body: shifted(body, "ear", 70.0), fit.a_small_printer_takes_it),
-        ("lid", lambda body: without(body, "screw"), fit.bosses_carry_the_board),
-        ("lid", lambda body: without(body, "light of D7"), fit.lights_are_seen),
-        ("lid", lambda body: without(body, "USB of the ESP32"), fit.plugs_reach_their_sockets),
-        ("lid", lambda body: shifted(body, "USB of the ESP32", 1.7), fit.plugs_reach_their_sockets),
-        ("lid", lambda body: without(body, "button"), fit.hands_reach_what_they_use),
-        ("lid", lambda body: without(body, "STOP"), fit.hands_reach_what_they_use),
-        ("lid", lambda body: shifted(body, "lip", 0.5), fit.base_and_lid_do_not_meet),
+        ("base", lambda body: without(body, "RS-232"), fit.plugs_reach_their_sockets,
+         "RS-232: the base is in the way at x 60.6, y 101.3, z 0.0 mm"),
+        ("base", lambda body: without(body, "USB"), fit.plugs_reach_their_sockets,
+         "USB of the BluePill: the base is in the way at x 13.1, y -3.0, z 9.6 mm"),
+        ("base", lambda body: shifted(body, "USB", 1.7), fit.plugs_reach_their_sockets,
+         "USB of the BluePill: the base is in the way at x 13.1, y -3.0, z 9.6 mm"),
+        ("base", lambda body: without(body, "12 V"), fit.plugs_reach_their_sockets,
+         "12 V: the base is in the way at x 9.5, y 101.4, z 1.0 mm"),
+        ("base", lambda body: without(body, "5 V"), fit.plugs_reach_their_sockets,
+         "5 V: the base is in the way at x 25.1, y 101.2, z 4.8 mm"),
+        ("base", lambda body: without(body, "boss"), fit.bosses_carry_the_board,
+         "no boss with an insert below the hole at x 4.0, y 4.0, z 0.0 mm"),
+        ("base", lambda body: shifted(body, "insert", 2.1), fit.bosses_carry_the_board,
+         "no boss with an insert below the hole at x 4.0, y 4.0, z 0.0 mm"),
+        ("base", lambda body: shifted(body, "boss", 10.0), fit.solder_keeps_off_the_base,
+         "a pad at x 11.0, y 94.4, z 0.0 mm stands in the base at x 10.6, y 94.0, z -4.6 mm"),
+        ("base", lambda body: shifted(body, "inside", 0.7), fit.parts_touch_nothing,
+         "rev-b: the board stands in the base at x 0.0, y 3.0, z -1.6 mm"),
+        ("base", lambda body: shifted(body, "ear", 70.0), fit.a_small_printer_takes_it,
+         "base: 187 x 120 mm"),
+        ("lid", lambda body: without(body, "screw"), fit.bosses_carry_the_board,
+         "no hole of the lid above x 4.0, y 4.0, z 0.0 mm"),
+        ("lid", lambda body: without(body, "light of D7"), fit.lights_are_seen,
+         "rev-b: D7"),
+        ("lid", lambda body: without(body, "USB of the ESP32"), fit.plugs_reach_their_sockets,
+         "USB of the ESP32: the lid is in the way at x 70.7, y 41.6, z 20.6 mm"),
+        ("lid", lambda body: shifted(body, "USB of the ESP32", 1.7), fit.plugs_reach_their_sockets,
+         "USB of the ESP32: the lid is in the way at x 70.7, y 41.6, z 20.6 mm"),
+        ("lid", lambda body: without(body, "button"), fit.hands_reach_what_they_use,
+         "button: the lid is closed at x 92.8, y 52.2, z 20.0 mm"),
+        ("lid", lambda body: without(body, "STOP"), fit.hands_reach_what_they_use,
+         "stop: the lid is closed at x 96.0, y 12.8, z 20.0 mm"),
+        ("lid", lambda body: shifted(body, "lip", 0.5), fit.base_and_lid_do_not_meet,
+         "at x 99.0, y 0.0, z 18.5 mm"),
     ],
-)
+)  # fmt: skip
 def test_a_fault_of_the_case_is_noticed(
-    which: str, change: object, check: object, monkeypatch: pytest.MonkeyPatch
+    which: str, change: object, check: object, said: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     changed = change(getattr(design, which)())  # type: ignore[operator]
     monkeypatch.setattr(design, which, lambda: changed)
-    assert check() != []  # type: ignore[operator]
+    assert check()[0] == said  # type: ignore[operator]
 
 
 def test_a_part_in_a_spacer_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -148,6 +167,28 @@ def test_the_picture_shows_the_board_in_the_base(tmp_path: Path) -> None:
     width = picture.shape[1] // 3
     assert green[:, :width].sum() > 5_000
     assert green[:, width:].sum() == 0
+
+
+def test_a_picture_shows_the_nearest_face_at_its_place_in_its_light() -> None:
+    numpy = pytest.importorskip("numpy")
+    orange, blue = (1.0, 0.5, 0.0), (0.0, 0.5, 1.0)
+    slab, tower = drawing._box(0, 40, 0, 30, -5, 0), drawing._box(10, 20, 5, 15, 0, 12)
+    faces = [*((one, orange) for one in slab), *((one, blue) for one in tower)]
+    picture = drawing._seen(faces, math.radians(28), math.radians(50)).round(3)
+    assert picture.shape == (440, 560, 3)
+    seen = {}
+    for light in (0.588, 0.681, 0.929):  # of the front, of the right side, from above
+        for name, colour in (("slab", orange), ("tower", blue)):
+            rows, columns = numpy.nonzero((abs(picture - light * numpy.array(colour)) < 0.002).all(axis=2))
+            seen[name, light] = len(rows), columns.min(), rows.min(), columns.max(), rows.max()
+    wanted = {
+        ("slab", 0.588): (478, 181, 103, 332, 177), ("slab", 0.681): (1243, 170, 87, 333, 177),
+        ("slab", 0.929): (8469, 170, 54, 332, 177), ("tower", 0.588): (381, 225, 64, 266, 109),
+        ("tower", 0.681): (738, 223, 51, 266, 109), ("tower", 0.929): (837, 223, 51, 266, 84),
+    }  # fmt: skip
+    for key, figures in wanted.items():
+        assert seen[key] == pytest.approx(figures, abs=1, rel=0.004), key
+    assert (picture == 1.0).all(axis=2).sum() == pytest.approx(234_254, abs=30)
 
 
 @pytest.mark.skipif(find_spec("build123d") is not None, reason="build123d is installed")

@@ -11,7 +11,17 @@ from hypothesis import strategies as st
 
 from bluepill_sim import BluePill
 from bluepill_sim.__main__ import run
-from bluepill_sim.analysis.interrupts.races import Channel, RaceReport, RaceSearch, RunOutputs, Slack, parting_of
+from bluepill_sim.analysis.interrupts.races import (
+    Channel,
+    HandlerStretches,
+    OutputParting,
+    RaceReport,
+    RaceSearch,
+    RunOutputs,
+    Slack,
+    parting_of,
+)
+from bluepill_sim.core.recorder import EXCEPTION_RETURN
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.program.image import load_image
 from simbase.timing import NS_PER_MS
@@ -203,3 +213,35 @@ def test_a_line_that_rises_again_while_its_interrupt_is_pending_draws_nothing_an
         board.chip.fabric.set_line(28, level)
     assert board.chip.latency.count == 1
     assert board.chip.processor.nvic.held == 1 << 44
+
+
+def test_a_stretch_is_as_long_as_handlers_run_one_in_another_and_at_once_after_each_other() -> None:
+    taken, longest = HandlerStretches(), []
+    rows = [(10, 4), (20, EXCEPTION_RETURN), (20, 5), (35, EXCEPTION_RETURN), (36, 4), (40, 6), (50, EXCEPTION_RETURN),
+            (55, 0), (58, EXCEPTION_RETURN), (60, EXCEPTION_RETURN), (70, 4), (99, EXCEPTION_RETURN)]  # fmt: skip
+    for cycle, kind in rows:
+        taken.put(cycle, 0x0800_0000, kind)
+        longest.append(taken.longest)
+    assert longest == [0, 10, 10, 25, 25, 25, 25, 25, 25, 25, 25, 29]
+    assert taken.entries == [10, 20, 36, 40, 70]
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "found"),
+    [
+        ({"PA0": [(100, 1)], "PA1": [(111, 1)]}, {"PA0": [(111, 1)], "PA1": [(100, 1)]}, (111, "PA0", 0, "PA1")),
+        ({"PA0": [(0, 1)], "PA1": [(11, 1)]}, {"PA0": [(11, 1)], "PA1": [(0, 1)]}, (11, "PA0", 0, "PA1")),
+        ({"PA0": [(50, 1), (100, 0)], "PA1": [(111, 1)]}, {"PA0": [(50, 1), (111, 0)], "PA1": [(100, 1)]},
+         (111, "PA0", 1, "PA1")),
+        ({"PA0": [(100, 1)]}, {}, (100, "PA0", 0, "")),
+        ({"PA1": [(100, 1)], "PA0": [(100, 1)]}, {}, (100, "PA0", 0, "")),
+        ({"PA1": [(100, 1)], "PA0": [(990, 1)]}, {"PA1": [(100, 1)]}, None),
+        ({"PA0": [(100, 1), (140, 0)]}, {"PA0": [(100, 1), (161, 0)]}, (140, "PA0", 1, "")),
+        ({"PA0": [(100, 1), (140, 0)]}, {"PA0": [(100, 1), (160, 0)]}, None),
+    ],
+)  # fmt: skip
+def test_the_first_parting_is_told_with_its_channel_its_place_and_what_came_before_it(
+    one: dict[str, list[tuple[int, int]]], other: dict[str, list[tuple[int, int]]], found: tuple[int, str, int, str]
+) -> None:
+    parted = parting_of(outputs(1000, **one), outputs(1000, **other), SLACK)
+    assert parted == (None if found is None else OutputParting(*found))

@@ -7,6 +7,8 @@ their difference is read as any other change is.
 import contextlib
 import hashlib
 import io
+import json
+import re
 import shlex
 import tempfile
 import zipfile
@@ -15,7 +17,18 @@ from pathlib import Path
 
 import pytest
 
+from bluepill_sim import BluePill
 from bluepill_sim.__main__ import run
+from bluepill_sim.analysis.coverage import Coverage
+from bluepill_sim.analysis.observation import Observation
+from bluepill_sim.analysis.program_lines import program_lines
+from bluepill_sim.debug.execution import Execution
+from bluepill_sim.debug.gdb_session import GdbSession
+from bluepill_sim.debug.machine import LoneChip
+from bluepill_sim.program.image import load_image
+from bluepill_sim.program.line_table import read_lines
+from bluepill_sim.program.static_code import StaticCode
+from bluepill_sim.program.variables import read_variables
 from tests.bluepill_sim.board.parts.test_attaching import ATTACHED
 from tests.bluepill_sim.board.parts.test_attaching import PROGRAM as PARTS
 from tests.tools.examples import EXAMPLES
@@ -81,6 +94,64 @@ def _shown(data: bytes) -> str:
     return f"{len(data)} bytes, SHA-256 {hashlib.sha256(data).hexdigest()}"
 
 
+#: What is said to `monitor` of GDB, one session; a number: the chip runs up to there, in ns.
+MONITOR = (
+    "help", "time", "blocks", "pins", "3000000", "time", "pins all", "pin pa9", "pin PA6 1", "pin PA6 z", "pin PA6 0",
+    "registers", "registers USART1", "registers RCC CFGR", "registers RCC NO", "registers NVIC", "snapshot",
+    "snapshot b", "wait 1ms", "time", "restore", "time", "restore c", "wait", "wait 3", "reset", "fault", "blocks",
+    "warnings", "tea", "registers TIM9", "pin", "pin PA4 2", "pin PA4 1 1",
+)  # fmt: skip
+
+
+def monitored() -> str:
+    """Return what the lines of `MONITOR` are answered."""
+    board = BluePill(EXAMPLES / "sensors.elf")
+    session = GdbSession(Execution(LoneChip(board), lambda _: None))
+    said = []
+    for line in MONITOR:
+        if line.isdigit():
+            board.advance_to(int(line))
+            said.append(f"# {board.now_ns} ns\n")
+        else:
+            answered = session.answer(b"qRcmd," + line.encode().hex().encode())
+            assert answered is not None
+            said.append(f"(gdb) monitor {line}\n{bytes.fromhex(answered.decode()).decode()}")
+    return "".join(said)
+
+
+def variables() -> str:
+    """Return the numbers of three programs, and those that are offered for some beginnings."""
+    said = []
+    for program in (EXAMPLES / "dodge.elf", PARTS, PARTS.with_name("unoptimised.elf")):
+        table = read_variables(load_image(program))
+        for name in table.offered("", 2000):
+            if re.search(r"\[([3-9]|\d\d+)\]", name) is None:
+                one = table.variable(name)
+                said.append(f"{one.address:#x} {one.size} {one.encoding.name} {one.first_bit} {one.bits} {name}: "
+                            f"{one.type_name}")  # fmt: skip
+        said += [f"{begun!r}: {', '.join(table.offered(begun, 4))}" for begun in ("main", "s", "STATE", "ring[2")]
+    return "\n".join(said) + "\n"
+
+
+def first_run() -> str:
+    """Return what has run of a program and when first, as the page of a run shows it."""
+    board = BluePill(EXAMPLES / "sensors.elf")
+    listener = Coverage(board.image, read_lines(board.image), StaticCode(board.chip.memory))
+    with Observation(board, [listener]):
+        board.advance_to(40_000_000)
+    found = program_lines(listener, Path("/nowhere"))
+    return "\n".join(json.dumps(row) for part in found.values() for row in part) + "\n"  # type: ignore[attr-defined]
+
+
+#: Name, and what makes it.
+OTHERS = {"monitor": monitored, "variables": variables, "first-run": first_run}
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_what_is_read_out_of_programs_is_what_it_was(name: str) -> None:
+    assert OTHERS[name]() == (ANSWERS / f"{name}.txt").read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize("name", VERBS)
 def test_a_verb_answers_as_it_did(name: str, tmp_path: Path) -> None:
     assert answer(VERBS[name], tmp_path) == (ANSWERS / f"{name}.txt").read_text(encoding="utf-8")
@@ -88,6 +159,8 @@ def test_a_verb_answers_as_it_did(name: str, tmp_path: Path) -> None:
 
 if __name__ == "__main__":
     ANSWERS.mkdir(exist_ok=True)
+    for each, make in OTHERS.items():
+        (ANSWERS / f"{each}.txt").write_text(make(), encoding="utf-8")
     for each, line in VERBS.items():
         with tempfile.TemporaryDirectory() as place:
             (ANSWERS / f"{each}.txt").write_text(answer(line, Path(place)), encoding="utf-8")

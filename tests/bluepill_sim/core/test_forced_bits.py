@@ -1,5 +1,7 @@
 """What a read-change-write of a register means, in code as compilers make it; nothing else is taken for one."""
 
+import random
+
 import pytest
 
 from bluepill_sim.core.forced_bits import forced_bits
@@ -64,3 +66,101 @@ def test_the_bits_that_a_store_means_are_found(text: str, bits: int) -> None:
 @pytest.mark.parametrize("text", OTHERS)
 def test_what_is_not_understood_means_nothing(text: str) -> None:
     assert forced_bits(code(text), REGISTERS.__getitem__, CRL, read)[0] == 0
+
+
+# Blocks of random code before the store, held against what Unicorn makes of them.
+
+#: Registers that random code may write: neither the register's address, nor what is read, nor a pointer to SRAM.
+FREE_LOW, FREE = (1, 2, 4, 5, 6), (1, 2, 4, 5, 6, 8, 9, 10, 11, 12)
+SRAM, CODE = 0x2000_1000, 0x0800_0000
+
+
+def narrow(rng: random.Random) -> list[int]:
+    """Return a 16-bit instruction whose meaning is known: shifts, sums, constants, pairs, copies and loads."""
+    d, n, m, most = rng.choice(FREE_LOW), rng.choice(FREE_LOW), rng.choice(FREE_LOW), rng.choice((1, 7, 31))
+    five, byte = rng.randint(0, most), rng.choice((0, 1, 5, 255, rng.randrange(256)))
+    high = rng.choice(FREE)
+    return [rng.choice((
+        five << 6 | n << 3 | d, 0x0800 | five << 6 | n << 3 | d,
+        rng.choice((0x1800, 0x1A00)) | m << 6 | n << 3 | d, rng.choice((0x1C00, 0x1E00)) | (five & 7) << 6 | n << 3 | d,
+        rng.choice((0x2000, 0x3000, 0x3800)) | d << 8 | byte,
+        0x4000 | rng.choice((0, 2, 3, 12, 14, 15)) << 6 | n << 3 | d,
+        0x4280 | n << 3 | d, 0x2800 | d << 8 | byte,  # comparisons write nothing
+        0x4600 | (high & 8) << 4 | rng.choice(FREE) << 3 | high & 7,
+        0x6800 | five << 6 | 7 << 3 | d, 0x9800 | d << 8 | five,
+    ))]  # fmt: skip
+
+
+def wide(rng: random.Random) -> list[int]:
+    """Return a 32-bit instruction whose meaning is known."""
+    d, n, m = (rng.choice(FREE) for _ in range(3))
+    constant = rng.randrange(2) << 26 | rng.randrange(8) << 12 | rng.randrange(1, 256)
+    operation = rng.choice((0, 1, 2, 3, 8, 13)) << 21
+    by = rng.randrange(8) << 12 | rng.randrange(4) << 6
+    base = 15 if operation == 3 << 21 else rng.choice((n, 15)) if operation == 2 << 21 else n
+    word = rng.choice((
+        0xEA00_0000 | operation | base << 16 | d << 8 | m, 0xF000_0000 | operation | base << 16 | d << 8 | constant,
+        0xEA4F_0000 | d << 8 | by | rng.randrange(2) << 4 | m, 0xF240_0000 | n << 16 | d << 8 | constant,
+        0xFA00_F000 | rng.randrange(2) << 21 | n << 16 | d << 8 | m, 0xF8D7_0000 | d << 12 | 4 * rng.randrange(31),
+    ))  # fmt: skip
+    return [word >> 16, word & 0xFFFF]
+
+
+def changing(rng: random.Random) -> list[int]:
+    """Return what changes the value read, in R3: by a register, a constant, or bits put into it."""
+    m, operation = rng.choice(FREE), rng.choice((0, 1, 2)) << 21
+    constant = rng.randrange(2) << 26 | rng.randrange(8) << 12 | rng.randrange(1, 256)
+    low = rng.randrange(32)
+    insert = (low >> 2) << 12 | (low & 3) << 6 | rng.randrange(low, 32)
+    word = rng.choice((
+        0xEA03_0300 | operation | m, 0xEA00_0303 | operation & ~(1 << 21) | m << 16, 0xF003_0300 | operation | constant,
+        0xF360_0300 | rng.choice((*FREE, 15)) << 16 | insert,
+    ))  # fmt: skip
+    return rng.choice(
+        ([0x4003 | rng.choice((0, 12, 14)) << 6 | rng.choice(FREE_LOW) << 3], [word >> 16, word & 0xFFFF])
+    )
+
+
+def before_the_store(program: bytes, registers: list[int], held: int, memory: bytes) -> list[int]:
+    """Return the registers that Unicorn comes to the last instruction with, where it has read `held`."""
+    from unicorn import UC_ARCH_ARM, UC_MODE_MCLASS, UC_MODE_THUMB, Uc
+    from unicorn.arm_const import UC_ARM_REG_R0, UC_ARM_REG_SP
+
+    core = Uc(UC_ARCH_ARM, UC_MODE_THUMB | UC_MODE_MCLASS)
+    for page, data in ((CODE, program), (SRAM, memory), (CRL & ~0xFFF, b"")):
+        core.mem_map(page, 0x1000)
+        core.mem_write(page, data)
+    core.mem_write(CRL, held.to_bytes(4, "little"))
+    for number, value in enumerate(registers[:13]):
+        core.reg_write(UC_ARM_REG_R0 + number, value)
+    core.reg_write(UC_ARM_REG_SP, registers[13])
+    core.emu_start(CODE | 1, CODE + len(program))
+    return [*(core.reg_read(UC_ARM_REG_R0 + number) for number in range(13)), registers[13], 0]
+
+
+@pytest.mark.parametrize("seed", range(120))
+def test_what_is_forced_does_not_depend_on_what_was_there_and_the_rest_does(seed: int) -> None:
+    rng = random.Random(seed)
+    halves = [half for _ in range(rng.randint(1, 5)) for half in rng.choice((narrow, wide))(rng)]
+    halves += rng.choice(([0x6803], [0xF8D0, 0x3000]))  # ldr r3, [r0]
+    halves += [half for _ in range(rng.randint(1, 2)) for half in changing(rng)]
+    halves += rng.choice(([0x6003], [0xF8C0, 0x3000]))  # str r3, [r0]
+    program = b"".join(half.to_bytes(2, "little") for half in halves)
+    memory = rng.randbytes(0x1000)
+    registers = [CRL, *(rng.getrandbits(rng.choice((5, 32))) for _ in range(6)), SRAM + 0x80]
+    registers += [*(rng.getrandbits(32) for _ in range(5)), SRAM + 0x40, 0]
+
+    def loaded(address: int, size: int) -> bytes:
+        return memory[address - SRAM : address - SRAM + size]
+
+    ones, zeros = (before_the_store(program, registers, held, memory) for held in (0xFFFF_FFFF, 0))
+    bits, seen = forced_bits(program, ones.__getitem__, CRL, loaded)
+    assert bits == ~(ones[3] ^ zeros[3]) & 0xFFFF_FFFF, program.hex()
+    # It hangs on what is named, and on nothing else.
+    others = [value if number in seen else value ^ 0x5A5A_5A5A for number, value in enumerate(ones)]
+
+    def named(address: int, size: int) -> bytes:
+        return seen[address].to_bytes(4, "little") if address in seen else bytes(size)
+
+    assert all(seen[number] == ones[number] for number in seen if number < 16)
+    assert forced_bits(program, others.__getitem__, CRL, named) == (bits, seen)

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from bluepill_sim.board import BluePill
 from bluepill_sim.errors import BluePillError, ImageError
+from bluepill_sim.program.elf_file import file_offset
 from bluepill_sim.program.image import Image, Symbol, SymbolTable, load_image, parse_image
 from simbase.errors import MissingDependencyError
 from tests.tools.examples import EXAMPLES
@@ -236,3 +237,15 @@ def test_a_stripped_elf_runs_without_names(tmp_path: Path) -> None:
     image = load_image(stripped)
     assert image.symbols == SymbolTable()
     assert image.segments == load_image(FIRMWARE).segments
+
+
+def test_a_place_of_the_flash_is_found_in_the_file_and_one_behind_the_program_is_not() -> None:
+    data = FIRMWARE.read_bytes()
+    ((start, held),) = load_image(FIRMWARE).segments
+    for offset in (0, 1, 0x134, len(held) - 1):
+        at = file_offset(data, start - 0x0800_0000 + offset)
+        assert data[at : at + 1] == held[offset : offset + 1]
+        assert data[at - offset : at - offset + len(held)] == held
+    with pytest.raises(ImageError, match=f"nothing is loaded at {start + len(held):#010x}") as refused:
+        file_offset(data, len(held))
+    assert refused.value.hint == "give the ELF that was linked"
