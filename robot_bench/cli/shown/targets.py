@@ -6,6 +6,7 @@ What runs and reads is imported where it is needed: a long run that was kept ope
 import contextlib
 import gc
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,8 +30,15 @@ def run_target(named: str) -> ViewTarget | None:
     if (folder / TRACE_NAME).is_file():
         with _without_collecting():
             found = kept(folder)
-            return _read_target(folder) if found is None else ViewTarget(source=StillRecording(found))
+            if found is None:
+                return _read_target(folder)
+        return ViewTarget(source=StillRecording(found), run=_get_ready)
     return _target_of_all(folder) or _campaign_target(folder)
+
+
+def _get_ready() -> None:
+    """Load what a closer look at packets needs, while the browser still opens the page."""
+    import_module("p2os.view.packet_rows")
 
 
 def _campaign_target(folder: Path) -> ViewTarget | None:
