@@ -257,6 +257,8 @@ class PagePlan:
     text: str = ""
     #: A command that makes it again.
     listing: str = ""
+    #: The number by which a page that is served opens it; None: it cannot be opened.
+    opens: int | None = None
     world: WorldHeader | None = None
     ways: Sequence[PageCurve] = ()
     #: Collisions, and other places with a word each.

@@ -17,7 +17,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import cache
 from importlib.resources import files
+from typing import cast
 
+from p2os.json_record import of_json
 from p2os.view.channels import WHOLE_PIXELS
 from p2os.view.frames import ViewFrame
 from p2os.view.header import PageHeader
@@ -27,6 +29,7 @@ from p2os.view.recording import ViewRecording
 LISTED = 5000
 #: Files of the bundle; the last one is for who looks into the package.
 PAGE, STYLE, SCRIPT, SCENE = "index.html", "page.css", "page.js", "scene.js"
+_HEADER = '<script type="application/json" id="header">'
 
 
 @cache
@@ -50,7 +53,7 @@ def page_of(recording: ViewRecording, *, all_is_in: str = "") -> str:
 def document(header: PageHeader, frames: Iterable[ViewFrame] = ()) -> str:
     """Return a page of a header and frames; one without channels is a report of sections alone."""
     data = b"".join(frame.to_bytes() for frame in frames)
-    blocks = [f'<script type="application/json" id="header">{_json(header)}</script>']
+    blocks = [f"{_HEADER}{_json(header)}</script>"]
     scripts = [bundled(SCRIPT)]
     if data:
         blocks.append(_block("frames", data))
@@ -69,6 +72,19 @@ def document(header: PageHeader, frames: Iterable[ViewFrame] = ()) -> str:
         "data": "\n".join(blocks),
         "script": f"<script>{bundled(SCRIPT)}</script>",
     })  # fmt: skip
+
+
+def header_in(document: str) -> PageHeader:
+    """Return the header of a page that is one file.
+
+    Raises:
+        ValueError, TypeError, KeyError: It is none.
+    """
+    _, begin, rest = document.partition(_HEADER)
+    text, end, _ = rest.partition("</script>")
+    if not begin or not end:
+        raise ValueError("a document without a header")
+    return cast("PageHeader", of_json(PageHeader, json.loads(text)))
 
 
 def filled(places: Mapping[str, str]) -> str:

@@ -17,7 +17,7 @@ StepUnit: TypeAlias = Literal["instruction", "line", "edge", "packet", "event", 
 #: What is done.
 Doing: TypeAlias = Literal[
     "run", "pause", "go", "step", "back", "speed", "fork", "choose", "drop", "compare", "halt_at", "halt_not_at",
-    "watch", "watch_not", "hand", "drive", "stop", "save",
+    "watch", "watch_not", "hand", "drive", "stop", "save", "open",
 ]  # fmt: skip
 #: chosen: words of a person in one line.
 MOST_LETTERS = 400
@@ -47,7 +47,7 @@ class RunCommand:
     future: str = ""
     #: Of several robots the one that `hand` and `drive` are for; empty: the only one, or the first.
     robot: str = ""
-    #: Of a place to halt at.
+    #: Of a place to halt at, or of what is opened.
     number: int = 0
     #: Of `drive`: m/s ahead, and degrees a second counter-clockwise. It has to come again and again (`DRIVE_HOLD_NS`).
     forward_mps: float = 0.0
@@ -74,6 +74,7 @@ COMMANDS: Mapping[str, frozenset[str]] = {
     "halt_not_at": frozenset({"number"}),
     "watch": frozenset({"words"}),
     "watch_not": frozenset({"words"}),
+    "open": frozenset({"number"}),
 }
 
 
@@ -128,6 +129,15 @@ class FutureState:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class OpenedRun:
+    """A run that was made of what a report shows: how it stands, and where it is seen; empty: not yet, or nowhere."""
+
+    number: int
+    words: str
+    url: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class RunState:
     """How a run stands."""
 
@@ -154,6 +164,8 @@ class RunState:
     hands: Sequence[HandState] = ()
     #: Where hands were written down, in a line.
     saved: str = ""
+    #: Of a report: what was opened of it.
+    opened: Sequence[OpenedRun] = ()
 
 
 class CommandError(Exception):
@@ -201,4 +213,14 @@ _CHECKS: Mapping[str, Callable[[object], bool]] = {
     "unit": lambda value: value in get_args(StepUnit),
 }  # fmt: skip
 
-__all__ = ["Doing", "FutureState", "HaltState", "HandState", "PartingState", "RunCommand", "RunState", "StepUnit"]
+__all__ = [
+    "Doing",
+    "FutureState",
+    "HaltState",
+    "HandState",
+    "OpenedRun",
+    "PartingState",
+    "RunCommand",
+    "RunState",
+    "StepUnit",
+]

@@ -35,6 +35,8 @@ from simbase.trust import Trust
 
 SCENARIO = "scenario"
 SUMMARY = "summary.json"
+#: Its page.
+PAGE = "report.html"
 #: chosen: of so many failures it is found until when they were avoidable; each takes ten runs or so.
 MOST_MOMENTS = 3
 
@@ -150,7 +152,7 @@ def carry_out(
     finally:
         conduct.close()
     _keep_corpus(whole)
-    write_text(whole.folder / "report.html", render(whole))
+    write_text(whole.folder / PAGE, render(whole))
     text = json.dumps(whole.as_json(), indent=2, sort_keys=True)
     write_text(folder / SUMMARY, f"{text}\n")
     return whole

@@ -104,7 +104,8 @@ def _why(whole: Whole) -> str:
     if row is None or row.failing is None:
         return ""
     why = next(iter(row.failing.outcome.failures), row.finding.value)
-    return f"point {row.number}: {why}; to look at it, run the command below its plan, and p2os view what it makes"
+    way = f"p2os view {shlex.quote(str(whole.folder))}, and open it there"
+    return f"point {row.number}: {why}; to look at it: {way}, or run the command below its plan"
 
 
 def _figures(whole: Whole) -> Iterator[tuple[str, str]]:
@@ -164,8 +165,8 @@ def _failure(row: PointRow, whole: Whole) -> Iterator[PagePlan]:
     way = [(x / 1000, y / 1000) for x, y in run.outcome.way_mm]
     hits = [(hit.x_m, hit.y_m) for hit in run.outcome.hits[:1]]
     yield PagePlan(
-        title=f"point {row.number}", text="; ".join(words), listing=whole.results.replay(row), world=_world(run),
-        ways=[_curve("way", way)], hits=hits, places=_last(moment),
+        title=f"point {row.number}", text="; ".join(words), listing=whole.results.replay(row), opens=row.number,
+        world=_world(run), ways=[_curve("way", way)], hits=hits, places=_last(moment),
     )  # fmt: skip
 
 

@@ -188,7 +188,10 @@ class RunSession:
         try:
             if self.holds.is_shown_to_gdb and self._moves(command):
                 raise UsageError(GDB_STANDS)
-            self._doing[command.do](command)
+            doing = self._doing.get(command.do)
+            if doing is None:
+                raise UsageError(f"a run knows no {command.do!r}")
+            doing(command)
         except P2osError as error:
             self._trouble = trouble_of(error)
             if command.do not in _BESIDE and not self.holds.is_shown_to_gdb:

@@ -6,6 +6,7 @@ What runs and reads is imported where it is needed: a long run that was kept ope
 import contextlib
 import gc
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,17 +20,33 @@ if TYPE_CHECKING:
 
 
 def run_target(named: str) -> ViewTarget | None:
-    """Return a run folder, of one robot or of several; None where it is none.
+    """Return a run folder, of one robot or of several, or a campaign's; None where it is none.
 
     Raises:
         TraceError: Its trace is damaged.
+        FileError: A campaign's report is, or it has none yet.
     """
     folder = Path(named)
     if (folder / TRACE_NAME).is_file():
         with _without_collecting():
             found = kept(folder)
-            return _read_target(folder) if found is None else ViewTarget(source=StillRecording(found))
-    return _target_of_all(folder)
+            if found is None:
+                return _read_target(folder)
+        return ViewTarget(source=StillRecording(found), run=_get_ready)
+    return _target_of_all(folder) or _campaign_target(folder)
+
+
+def _get_ready() -> None:
+    """Load what a closer look at packets needs, while the browser still opens the page."""
+    import_module("p2os.view.packet_rows")
+
+
+def _campaign_target(folder: Path) -> ViewTarget | None:
+    if not folder.is_dir():
+        return None
+    from robot_bench.cli.shown.campaign_page import campaign_target
+
+    return campaign_target(folder)
 
 
 def _read_target(folder: Path) -> ViewTarget:

@@ -58,6 +58,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return run_scenario(scenario, tmp_path_factory.mktemp("run") / "run").folder
 
 
+def is_kept(recording: ViewRecording) -> bool:
+    """Tell whether no row of a recording was read yet."""
+    return all(track.later is not None and track.packed_whole is not None for track in recording.tracks)
+
+
 def rows_of(recording: ViewRecording) -> dict[int, str]:
     return {track.header.id: str([[*map(str, values)] for values in track.columns]) for track in recording.tracks}
 
@@ -73,7 +78,10 @@ def test_what_is_kept_of_a_run_is_what_its_trace_shows(folder: Path) -> None:
     assert json.dumps(found.full_header.as_json()) == json.dumps(wanted)
     target = run_target(str(folder))
     assert target is not None
-    assert target.run is None
+    assert is_kept(target.source.recording)
+    assert target.run is not None
+    target.run()
+    assert is_kept(target.source.recording), "nothing is read before somebody looks"
     assert target.source.recording.header == found.header
 
 
@@ -158,7 +166,7 @@ def test_what_was_kept_of_another_run_or_is_damaged_is_not_shown(
     assert kept(tmp_path) is None
     target = run_target(str(tmp_path))
     assert target is not None
-    assert target.run is not None
+    assert not is_kept(target.source.recording)
 
 
 def test_a_run_that_was_read_is_kept_for_the_next_time(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

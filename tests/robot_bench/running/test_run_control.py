@@ -195,6 +195,7 @@ def test_a_fork_is_the_run_again_where_nothing_is_done_and_parts_where_something
     same = run.do("fork", at_ns=NS_PER_S)
     assert (same.future, same.head_ns) == ("fork 1", NS_PER_S)
     run.do("go", at_ns=round(1.5 * NS_PER_S))
+    assert run.do("open", number=1).trouble == "a run knows no 'open'"
     alike = run.do("compare", future="run").futures[1]
     assert (alike.against, alike.parting) == ("run", ())
     assert alike.until_ns >= round(1.5 * NS_PER_S)

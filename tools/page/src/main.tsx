@@ -7,6 +7,7 @@ import { render } from "preact";
 import { inlineHeader, inlineStore } from "./data/inline";
 import { Connection } from "./data/socket";
 import type { Store } from "./data/store";
+import type { PageHeader } from "./generated/view";
 import { token } from "./data/token";
 import { App } from "./shell/app";
 import { drawTimes, svgOf } from "./shell/surface";
@@ -21,7 +22,16 @@ declare global {
 
 const place = document.getElementById("app")!;
 
+/** Whether a header is that of a report alone, which is read as a document. */
+const isReport = (header: PageHeader) => !header.channels.length && !header.world && !header.is_live;
+
 function show(store: Store): void {
+  const header = store.header.peek();
+  if (isReport(header)) {
+    document.title = header.title || document.title;
+    render(<ReportPage header={header} store={store} />, place);
+    return;
+  }
   const app = new App(store);
   window.p2osPage = { app, frameTimes, drawTimes, svgOf };
   document.title = store.header.value.title || document.title;
@@ -30,8 +40,8 @@ function show(store: Store): void {
 
 const header = inlineHeader();
 if (header) {
-  if (header.channels.length || header.world) show(inlineStore(header));
-  else render(<ReportPage header={header} />, place);
+  if (isReport(header)) render(<ReportPage header={header} />, place);
+  else show(inlineStore(header));
 } else {
   waiting.value = "Waiting for the program that shows this run …";
   render(<Waiting />, place);

@@ -320,6 +320,7 @@ export interface PagePlan {
   readonly title: string;
   readonly text: string;
   readonly listing: string;
+  readonly opens: number | null;
   readonly world: WorldHeader | null;
   readonly ways: readonly PageCurve[];
   readonly hits: readonly (readonly [number, number])[];
@@ -499,6 +500,13 @@ export interface HandState {
   readonly words: string;
 }
 
+/** A run that was made of what a report shows: how it stands, and where it is seen; empty: not yet, or nowhere. */
+export interface OpenedRun {
+  readonly number: number;
+  readonly words: string;
+  readonly url: string;
+}
+
 /** Where a signal of two futures differs first. */
 export interface PartingState {
   readonly signal: string;
@@ -509,7 +517,7 @@ export interface PartingState {
 
 /** What a page asks of a run. */
 export interface RunCommand {
-  readonly do: "run" | "pause" | "go" | "step" | "back" | "speed" | "fork" | "choose" | "drop" | "compare" | "halt_at" | "halt_not_at" | "watch" | "watch_not" | "hand" | "drive" | "stop" | "save";
+  readonly do: "run" | "pause" | "go" | "step" | "back" | "speed" | "fork" | "choose" | "drop" | "compare" | "halt_at" | "halt_not_at" | "watch" | "watch_not" | "hand" | "drive" | "stop" | "save" | "open";
   readonly at_ns: number | null;
   readonly unit: "instruction" | "line" | "edge" | "packet" | "event" | "millisecond";
   readonly speed: number;
@@ -537,9 +545,10 @@ export interface RunState {
   readonly hand_count: number;
   readonly hands: readonly HandState[];
   readonly saved: string;
+  readonly opened: readonly OpenedRun[];
 }
 
 export type Standing = "" | "passed" | "failed" | "open";
 export type PageBlock = PageTable | PageText | PagePicture | PagePlot | PageList | PagePlan | PageDrawing | PageSource;
-export type Doing = "run" | "pause" | "go" | "step" | "back" | "speed" | "fork" | "choose" | "drop" | "compare" | "halt_at" | "halt_not_at" | "watch" | "watch_not" | "hand" | "drive" | "stop" | "save";
+export type Doing = "run" | "pause" | "go" | "step" | "back" | "speed" | "fork" | "choose" | "drop" | "compare" | "halt_at" | "halt_not_at" | "watch" | "watch_not" | "hand" | "drive" | "stop" | "save" | "open";
 export type StepUnit = "instruction" | "line" | "edge" | "packet" | "event" | "millisecond";

@@ -9,13 +9,15 @@ import { LAYOUTS } from "./layouts";
 interface Props {
   readonly header: PageHeader;
   readonly app?: App;
+  /** What is wrong with the connection of a page without an app. */
+  readonly trouble?: string;
   readonly layout?: string;
   readonly onLayout?: (id: string) => void;
   readonly onLink?: () => Promise<boolean>;
 }
 
-export function Head({ header, app, layout, onLayout, onLink }: Props) {
-  const [isHelp, setHelp] = useState(false), [said, setSaid] = useState(""), trouble = app?.store.trouble.value;
+export function Head({ header, app, trouble: ofReport, layout, onLayout, onLink }: Props) {
+  const [isHelp, setHelp] = useState(false), [said, setSaid] = useState(""), trouble = app?.store.trouble.value ?? ofReport;
   return (
     <header class="head">
       <div class="head-title">

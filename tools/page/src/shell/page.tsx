@@ -2,8 +2,10 @@
 import { effect, signal } from "@preact/signals";
 import { useEffect, useRef, useState } from "preact/hooks";
 import type { PageHeader } from "../generated/view";
+import type { Store } from "../data/store";
 import { viewsOf } from "../views/all";
 import { Sections } from "../views/report/blocks";
+import { OPENS_AT } from "../views/report/open_run";
 import type { App } from "./app";
 import { type Dock, mountDock } from "./dock";
 import { Head } from "./head";
@@ -18,11 +20,12 @@ const WIDE = "(min-width: 760px)";
 /** How long the address waits for a time that stands, ms. */
 const ADDRESS_MS = 400;
 
-export function ReportPage({ header }: { header: PageHeader }) {
+/** @param store Of a page that is served. */
+export function ReportPage({ header, store }: { header: PageHeader; store?: Store }) {
   return (
     <div class="document">
-      <Head header={header} />
-      <main class="report"><Sections sections={header.sections} seek={undefined} /></main>
+      <Head header={header} {...(store ? { trouble: store.trouble.value } : {})} />
+      <main class="report"><OPENS_AT.Provider value={store}><Sections sections={header.sections} seek={undefined} /></OPENS_AT.Provider></main>
       {header.footer && <footer>{header.footer}</footer>}
     </div>
   );

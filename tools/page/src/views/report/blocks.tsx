@@ -6,6 +6,7 @@ import { Icon, type IconName } from "../../shell/icons";
 import { mountPlan } from "./figure_plan";
 import { mountPlot } from "./figure_plot";
 import { isLink } from "./links";
+import { OpenRun } from "./open_run";
 import { moment } from "../../time/format";
 
 /** Goes to a time of the run; absent on a page without one. */
@@ -36,7 +37,7 @@ function Block({ block, seek }: { block: PageBlock; seek: Seek }) {
     case "source": return <Source block={block} seek={seek} />;
     case "drawing": return <Drawing block={block} />;
     case "plot": return <Mounted mount={(host) => mountPlot(host, block)} />;
-    case "plan": return <Mounted mount={(host) => mountPlan(host, block)} />;
+    case "plan": return <div><Mounted mount={(host) => mountPlan(host, block)} />{block.opens !== null && <OpenRun number={block.opens} title={block.title} />}</div>;
   }
 }
 
