@@ -13,7 +13,7 @@ comma := ,
 # One more than two cores: many tests wait for a real clock. With four a run takes as long.
 JOBS   ?= 3
 # What is built with the package: set up again when it has changed.
-COMPILED := $(wildcard bluepill_sim/extension/source/*/*) robot_bench/wires/edges.c \
+COMPILED := $(wildcard bluepill_sim/extension/source/*/*) robot_bench/wires/edges.c $(wildcard robot_bench/direct/differential/*.[ch]) \
     $(shell find adapter_fw/core adapter_fw/capi adapter_fw/esp32/main adapter_fw/esp32_sim -type f)
 
 .PHONY: page page-check setup demo test lint type unit wheels bench bench-history soak steady mutants hostile foreign clean firmware mutation-tools board board-check board-tools pictures site generated

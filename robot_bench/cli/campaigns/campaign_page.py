@@ -1,4 +1,4 @@
-"""A campaign's page, served: a failing point is run again and opened by one click.
+"""A campaign's page, served (an entry point of `p2os.view_sources`): a failing point is run again by one click.
 
 A page asks by the point's number alone. What runs is the folder that the campaign has made of it, as `p2os run` would;
 its hash is compared with that in the campaign's summary, and the run is served beside, with a link of its own.
@@ -41,12 +41,13 @@ class FailedPoint:
     sha256: str
 
 
-def campaign_target(folder: Path) -> ViewTarget | None:
+def campaign_target(named: str) -> ViewTarget | None:
     """Return a campaign's folder; None where it is none.
 
     Raises:
         FileError: It has no report yet, or a damaged one.
     """
+    folder = Path(named)
     if not (folder / JOURNAL).is_file():
         return None
     if not (folder / PAGE).is_file():
