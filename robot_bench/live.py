@@ -1,4 +1,4 @@
-"""A running bench for Foxglove and Lichtblick: a WebSocket server that tells what happens, as it happens.
+"""A running bench for Foxglove and Lichtblick (an entry point of `robot_bench.viewers`): what happens, by WebSocket.
 
 The messages are those of `robot_bench.recording.scene_messages`, over Foxglove's own protocol (subprotocol
 `foxglove.sdk.v1`, by the library foxglove-sdk, extra `foxglove`). The server binds to loopback unless told otherwise.
@@ -11,7 +11,7 @@ Invariant: nobody who looks on decides anything: the trace is the same with and 
 import contextlib
 import json
 import random
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import Any
 
 from adapter_sim.pinout import load_pinout
@@ -19,7 +19,7 @@ from robot_bench.bench import Bench, run_of
 from robot_bench.events.kinds import PinEdge
 from robot_bench.origin_gate import OriginGate
 from robot_bench.recording.scene_messages import Message, SceneMessages, topics
-from robot_bench.run import meta_of
+from robot_bench.run import RunBench, meta_of
 from robot_bench.scenario.scenario import Scenario
 from simbase.errors import MissingDependencyError, UsageError
 
@@ -129,11 +129,16 @@ class LiveScene:
         self._gate.close()
 
 
+def place_before(word: str) -> Sequence[str]:
+    """Return the port where Foxglove looks by itself, where the word that follows the option is no place."""
+    return () if word.rpartition(":")[2].isdecimal() else (str(PORT),)
+
+
 @contextlib.contextmanager
 def live_scene(
     scenario: Scenario, place: str, on_ready: Callable[[str], None], origins: Collection[str] = ()
-) -> Iterator[LiveScene]:
-    """Serve the run of a scenario for a block.
+) -> Iterator[RunBench]:
+    """Serve the run of a scenario for a block; yield what runs it.
 
     Args:
         scenario: What will be run.
@@ -152,6 +157,6 @@ def live_scene(
     scene = LiveScene(topics(scenario.parameters.sonar_fitted, wires), host or HOST, int(port), origins)
     try:
         on_ready(scene.url)
-        yield scene
+        yield scene.drive
     finally:
         scene.close()

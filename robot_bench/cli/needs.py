@@ -18,6 +18,7 @@ NEEDS = (
         point="ros",
         points=("robot_bench.networks", "robot_bench.bags", "robot_bench.drive_readers"),
     ),
+    Need(name="Foxglove", kind="plug-in", feature="run --foxglove", points=("robot_bench.viewers",), point="foxglove"),
     Need(name="board test", kind="plug-in", feature="board", points=("p2os.verbs",), point="board"),
     Need(
         name="studies",

@@ -37,7 +37,7 @@ from robot_bench.cli.sweep import (
 )
 from robot_bench.cli.table import print_result
 from robot_bench.cli.workers import Jobs, core_count
-from robot_bench.networks import network_of
+from robot_bench.networks import network_of, viewer_of
 from robot_bench.recording.run_folder import make_next_folder
 from robot_bench.remote import CAUTIOUS_ROTATION_DEG_S, CAUTIOUS_VELOCITY_MM_S
 from robot_bench.run import RunBench, RunProgress, RunResult, run_at_port, run_scenario, run_together
@@ -89,8 +89,6 @@ Examples:
 """
 
 
-#: Where Foxglove looks by itself.
-FOXGLOVE_PORT = "8765"
 #: Options of a scenario whose flag is not their name.
 _FLAGS = {"adapter_core": "--adapter", "duration_s": "--duration", "usart_baud": "--usart-baud"}
 
@@ -100,7 +98,7 @@ class RunPage(VerbPage):
 
     usual: ClassVar[Mapping[str, Usual]] = {
         "--realtime": lambda following: () if _is_number(following) else ("1",),
-        "--foxglove": lambda following: () if following.rpartition(":")[2].isdecimal() else (FOXGLOVE_PORT,),
+        "--foxglove": lambda following: viewer_of("foxglove").place_before(following),
         "--gdb": usual_port,
         "--ros": lambda following: network_of("ros").place_before(following),
     }
@@ -350,14 +348,13 @@ def driven(
 
     Raises:
         UsageError: The scenario has no pins of the pin-out, or a place is none.
-        MissingDependencyError, TransportError, FileError: As of `Network` and `live_scene`.
+        MissingDependencyError, TransportError, FileError: As of `Network` and `Viewer`.
     """
     if foxglove is not None:
-        from robot_bench.live import live_scene
-
-        tell = "open {} in Foxglove or Lichtblick".format
-        with live_scene(scenario, foxglove, lambda url: typer.echo(tell(url), err=True), origins) as scene:
-            yield scene.drive
+        say = "open {} in Foxglove or Lichtblick".format
+        viewer = viewer_of("foxglove")
+        with viewer.live_scene(scenario, foxglove, lambda url: typer.echo(say(url), err=True), origins) as driver:
+            yield driver
         return
     if ros is None and inputs is None:
         yield None

@@ -132,6 +132,7 @@ ASKED = [
     ("worlds", "world check place.sdf", "place.sdf", "no reader for .sdf", "world files (worlds"),
     ("view", "run motors --view --no-browser", "", "--view is not there", "page (view, --view)"),
     ("ros", "run motors --ros", "", "--ros is not there", "ROS bench (run --ros"),
+    ("foxglove", "run motors --foxglove", "", "--foxglove is not there", "Foxglove (run --foxglove"),
     ("ros", "report run --events b --ros2 mcap", "run/trace.jsonl", "there is no storage 'mcap'", "ROS bench (run"),
     ("ros", "compare bag bag", "bag/metadata.yaml", "bag holds no trace.jsonl", "ROS bench (run"),
 ]

@@ -243,12 +243,12 @@ def test_a_viewer_of_a_running_bench_gets_the_scene_and_changes_nothing(tmp_path
     found: dict[str, list[dict[str, Any]]] = {}
     subprotocols: list[str] = []
     urls: list[str] = []
-    with live_scene(scenario, "127.0.0.1:0", urls.append) as scene:
+    with live_scene(scenario, "127.0.0.1:0", urls.append) as driver:
         viewer = threading.Thread(target=looked_on, args=(urls[0], found, subprotocols))
         viewer.start()
         while viewer.is_alive() and not subprotocols:
             time.sleep(0.02)
-        seen = run_scenario(scenario, tmp_path / "seen", drive=scene.drive, speed=2.0)
+        seen = run_scenario(scenario, tmp_path / "seen", drive=driver, speed=2.0)
     viewer.join(60)
     alone = run_scenario(scenario, tmp_path / "alone")
     assert seen.outcome["trace_sha256"] == alone.outcome["trace_sha256"]
