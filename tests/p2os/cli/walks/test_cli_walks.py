@@ -22,8 +22,8 @@ from p2os.client import Link, RobotPose
 from p2os.protocol.command_table import ROWS
 from p2os.protocol.profiles import Profile
 from simbase.timing import NS_PER_MS
-from tests.p2os.cli.test_dashboard import STATE, dashboard, echo
-from tests.tools.approved import Trace, judge_of, said, tried
+from tests.p2os.cli.robots.test_dashboard import STATE, dashboard, echo
+from tests.tools.suite.approved import Trace, judge_of, said, tried
 
 GOLDEN = Path(__file__).resolve().parents[3] / "golden" / "captures"
 VEL = "fafb060b3bc800d33b"

@@ -13,7 +13,7 @@ from p2os.protocol.commands import CommandNumber as C
 from p2os.protocol.profiles import Profile
 from simbase.errors import P2osError
 from tests.p2os.client.client_rig import MS, Rig, free_pioneer, new_pioneer
-from tests.tools.approved import Trace, judge_of, refusal, said
+from tests.tools.suite.approved import Trace, judge_of, refusal, said
 
 USUAL = ClientSettings()
 WORDS = ("stop-button", "wheel-blocked left", "bumper front 2", "line-noise 0.002", "low-battery 10.9")

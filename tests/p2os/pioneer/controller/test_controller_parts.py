@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from p2os.pioneer.body.contract import BodyState, Turned
 from p2os.pioneer.body.factory import make_body
-from p2os.pioneer.controller import ControllerSettings, Pioneer
+from p2os.pioneer.controller import ControllerSettings, Pioneer, bumper_watch
 from p2os.pioneer.controller.dead_reckoning import POSITION_MODULUS, DeadReckoning, raw_angle
 from p2os.pioneer.controller.reporter import _standard_packet
 from p2os.pioneer.sonar.schedule import LARGEST_COUNTS, NO_ECHO_COUNTS, SonarSchedule, raw_range
@@ -215,3 +215,18 @@ def test_a_range_is_sent_in_counts_and_no_echo_in_its_own(range_m: float, counts
 def test_a_range_never_overflows_its_field() -> None:
     far = replace(load_parameters("p2dx"), sonar_range_m=100.0)
     assert raw_range(99.0, far, Profile.P2OS) == LARGEST_COUNTS
+
+
+@pytest.mark.parametrize("segments", [1, 5, 6, 7])
+def test_a_bumper_is_pressed_at_the_segment_of_its_bearing_and_none_beside_its_ring(segments: int) -> None:
+    """Segment 1, the lowest bit, is the leftmost of the ring."""
+    half, wide = bumper_watch.RING_RAD / 2, bumper_watch.RING_RAD / segments
+    for number in range(segments):
+        for share in (0.01, 0.5, 0.99):
+            assert bumper_watch._touched(segments, half - (number + share) * wide) == 1 << number
+    assert bumper_watch._touched(segments, half) == 1
+    assert bumper_watch._touched(segments, -half) == 1 << segments - 1
+    for bearing in (math.nextafter(half, 9.0), math.nextafter(-half, -9.0), math.pi):
+        assert bumper_watch._touched(segments, bearing) == 0
+    assert bumper_watch._touched(0, 0.0) == bumper_watch._middle(0) == 0
+    assert bumper_watch._middle(segments) == {1: 1, 5: 0b100, 6: 0b1000, 7: 0b1000}[segments]

@@ -16,7 +16,7 @@ from p2os.toml_schema import Key, Kind, TablePlace, filled, within
 from simbase.errors import FileError
 from simbase.timing import NS_PER_MS
 from tests.p2os.robots.test_robot_files import MINE
-from tests.tools.approved import Trace, judge_of, said, tried
+from tests.tools.suite.approved import Trace, judge_of, said, tried
 
 P2DX = files("p2os.robots").joinpath("p2dx.toml").read_text(encoding="utf-8")
 PROPERTIES = [name for name, value in vars(model.RobotParameters).items() if isinstance(value, property)]
@@ -40,7 +40,7 @@ def robot_files(draw: random.Random) -> Iterator[str]:
     with tempfile.TemporaryDirectory() as made:
         for name, text in (("my.toml", P2DX), ("my.p", MINE)):
             places = [*(_VALUE if name == "my.toml" else re.compile(r"(?<= )-?\d+(?:\.\d+)?")).finditer(text)]
-            for one in places if name == "my.p" else draw.sample(places, 60):
+            for one in places if name == "my.p" else draw.sample(places, 25):
                 path = Path(made) / name
                 path.write_text(text[: one.start()] + draw.choice(VALUES) + text[one.end() :], encoding="utf-8")
                 yield tried(load_parameters, path).replace(made, "…")

@@ -27,7 +27,6 @@ HEADINGS = tuple(step / 4 - 1.0 for step in range(9))
 FAN = Cone(0.05, -0.02, HEADINGS, tuple((math.cos(heading), math.sin(heading)) for heading in HEADINGS))
 RAMP = {"kind": ObstacleKind.RAMP, "length_m": 1.0, "width_m": 1.2}
 THINGS: dict[str, tuple[Obstacle, ...]] = {
-    "free": (),
     "wall": (Obstacle(name="wall", x_m=0.5, y_m=0.1, heading_rad=0.4, length_m=0.2, width_m=2.0, fixed=True),),
     "post": (Obstacle(name="post", x_m=0.45, y_m=0.05, radius_m=0.1, height_m=1.0),),
     "sill": (Obstacle(name="sill", x_m=0.5, y_m=0.0, length_m=0.05, width_m=2.0, height_m=0.03),),
@@ -41,7 +40,6 @@ THINGS: dict[str, tuple[Obstacle, ...]] = {
         Obstacle(name="visitor", x_m=1.0, y_m=0.6, radius_m=0.2, height_m=1.7,
                  walk=Walk(points_m=((1.0, 0.6), (0.6, -0.6)), speed_mps=1.0)),
     ),
-    "table": (Obstacle(name="table", x_m=1.0, y_m=0.0, length_m=1.0, width_m=1.0, base_m=0.7, height_m=0.05),),
     "crowd": tuple(
         Obstacle(name=f"stone {n}", x_m=2 * math.cos(n / 2), y_m=2 * math.sin(n / 2), heading_rad=n / 3, length_m=0.3,
                  width_m=0.2, fixed=True) for n in range(13)
@@ -84,7 +82,7 @@ def shown(engine: str, case: str, model: str = "p2dx") -> list[list[float]]:
     body = make_body(engine, world, load_parameters(model), start=start)
     seen = [looks(body)]
     body.ramp([(0.3 * step / 200, 0.25 * step / 200) for step in range(200)])
-    for left, right, steps in ((0.3, 0.25, 350), (0.3, 0.3, 500), (-0.2, -0.1, 300), (0.0, 0.0, 60)):
+    for left, right, steps in ((0.3, 0.25, 300), (0.3, 0.3, 350), (-0.2, -0.1, 150), (0.0, 0.0, 60)):
         body.hold(left, right, steps)
         seen.append(looks(body))
     body.place(Obstacle(name="late", x_m=-1.0, y_m=0.5, radius_m=0.1, height_m=0.6))

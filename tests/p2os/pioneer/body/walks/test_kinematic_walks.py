@@ -11,7 +11,7 @@ from p2os.pioneer.world.loader import load_world
 from p2os.pioneer.world.model import Pose, World
 from p2os.robots.parameters import load_parameters
 from tests.p2os.pioneer.world.walks.things import drawn_thing, drawn_world
-from tests.tools.approved import Trace, judge_of, said, tried
+from tests.tools.suite.approved import Trace, judge_of, said, tried
 
 MODELS = tuple(map(load_parameters, ("p2dx", "p3at", "amigo", "patrolbot-sh")))
 SPEEDS = (0.0, 0.1, 0.3, 0.3, 0.75, -0.2, -0.4)
@@ -92,7 +92,7 @@ def together(draw: random.Random) -> Iterator[str]:
         starts = [Pose(0.7 * number - 1.0, round(draw.uniform(-0.5, 0.5), 2), draw.choice((0.0, 3.14, 1.0)))
                   for number in range(count)]  # fmt: skip
         scene = make_scene("kinematic", world, MODELS[:count], starts)
-        for number in range(20):
+        for number in range(16):
             asked = [
                 draw.choice(((draw.choice(SPEEDS),) * 2, (0.1, 0.3), (0.0, 0.2), (0.3, 0.3))) for _ in range(count)
             ]

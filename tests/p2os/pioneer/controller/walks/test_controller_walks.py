@@ -18,7 +18,7 @@ from p2os.protocol.commands import CommandNumber as C
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import load_parameters
 from simbase.timing import NS_PER_MS
-from tests.tools.approved import Trace, judge_of, said, tried
+from tests.tools.suite.approved import Trace, judge_of, said, tried
 
 LASER = LaserModel(start_deg=-20, end_deg=20, step_cdeg=200, range_m=8.0)
 #: What moves the robot, and is said more often than the rest.
@@ -115,7 +115,7 @@ def life(  # noqa: C901 - a table of acts
 
 def plain(draw: random.Random) -> Iterator[str]:
     for profile, model in zip(Profile, ("p2dx", "p2at8", "p3dx-sh"), strict=True):
-        yield from life(draw, model, ControllerSettings(profile=profile, seed=1), 120, 4)
+        yield from life(draw, model, ControllerSettings(profile=profile, seed=1), 80, 6)
 
 
 def erring(draw: random.Random) -> Iterator[str]:
@@ -124,13 +124,13 @@ def erring(draw: random.Random) -> Iterator[str]:
             profile=profile, errors=REALISTIC, baud=draw.choice((9600, 19200)), seed=2, battery_decivolts=118,
             sonar_per_sip=SonarPerSip.ALL, rear_sonar=True, watchdog_ns=600 * NS_PER_MS,
         )  # fmt: skip
-        yield from life(draw, model, chosen, 45, 8)
+        yield from life(draw, model, chosen, 32, 11)
 
 
 def simulated(draw: random.Random) -> Iterator[str]:
     chosen = replace(ControllerSettings.for_client("aria"), laser=LASER, lenient=True)
     for model in ("p3dx", "amigo-sh"):
-        yield from life(draw, model, chosen, 45, 8)
+        yield from life(draw, model, chosen, 32, 11)
 
 
 TRACES: dict[str, Trace] = {each.__name__: each for each in (plain, erring, simulated)}

@@ -20,7 +20,7 @@ from tests.p2os.pioneer.world import test_importers_maps as maps
 from tests.p2os.pioneer.world import test_importers_meshes as meshes
 from tests.p2os.pioneer.world import test_importers_xml as xml
 from tests.p2os.pioneer.world.walks.things import drawn_world
-from tests.tools.approved import Trace, judge_of, refusal, rounded, said, tried
+from tests.tools.suite.approved import Trace, judge_of, refusal, rounded, said, tried
 
 _NUMBER = re.compile(r"(?<![\w#.])-?\d+(?:\.\d+)?(?![\w.])")
 NUMBERS = ("0", "1", "-1", "2", "0.5", "3", "1000", "1e9", "90", "x", "")

@@ -14,7 +14,7 @@ from p2os.pioneer.world.start_places import floor_height, start_places
 from p2os.pioneer.world.writer import write_world
 from p2os.robots.parameters import load_parameters
 from tests.p2os.pioneer.world.walks.things import drawn_mesh, drawn_thing, drawn_walk, drawn_world
-from tests.tools.approved import Trace, judge_of, rounded, said, tried
+from tests.tools.suite.approved import Trace, judge_of, rounded, said, tried
 
 P2DX, PATROLBOT = load_parameters("p2dx"), load_parameters("patrolbot-sh")
 

@@ -1,8 +1,8 @@
 """What programs have shown when somebody looked at it: checksums of traces, line by line, which tests hold them to.
 
-    python -m tests.tools.approved tests/p2os/…/walks/test_*.py            names the traces that are otherwise
-    python -m tests.tools.approved tests/p2os/…/walks/test_*.py --write D  writes every trace into a folder
-    python -m tests.tools.approved tests/p2os/…/walks/test_*.py --approve  takes what they show now for right
+    python -m tests.tools.suite.approved tests/p2os/…/walks/test_*.py            names the traces that are otherwise
+    python -m tests.tools.suite.approved tests/p2os/…/walks/test_*.py --write D  writes every trace into a folder
+    python -m tests.tools.suite.approved tests/p2os/…/walks/test_*.py --approve  takes what they show now for right
 
 A file of tests has a table of traces, `TRACES`, and the test `judge_of(__file__, TRACES)`; `approved.json` beside it
 keeps the checksums. A change that is meant changes traces too: write them before and behind it, read the difference
@@ -89,7 +89,7 @@ def judge_of(file: str, traces: Mapping[str, Trace]) -> Callable[..., None]:
 
 
 def _hint(file: str) -> str:
-    return f"(hint: `python -m tests.tools.approved {Path(file).name} --write FOLDER` at both commits, `diff -u`)"
+    return f"(hint: `python -m tests.tools.suite.approved {Path(file).name} --write FOLDER` at both commits, `diff -u`)"
 
 
 def _lines(name: str, trace: Trace) -> list[str]:
@@ -115,7 +115,7 @@ def _approve(file: Path, traces: Mapping[str, Sequence[str]]) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Compare, write or approve; return the exit code: 1 where a trace is otherwise."""
-    parser = argparse.ArgumentParser(prog="python -m tests.tools.approved", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m tests.tools.suite.approved", description=__doc__)
     parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="files of tests")
     parser.add_argument("--write", type=Path, metavar="FOLDER", help="write the traces there")
     parser.add_argument("--approve", action="store_true", help="take them for right")
