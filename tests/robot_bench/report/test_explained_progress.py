@@ -9,7 +9,7 @@ import pytest
 from robot_bench.events.kinds import Contact, Fault, Note, Verdict
 from robot_bench.recording.run_record import RunRecord
 from robot_bench.report.explain import explain as explaining
-from robot_bench.report.explain.findings import read_gap
+from robot_bench.report.explain.findings import codes_between, read_gap
 from robot_bench.report.explain.probing import Codes, SensorResponse
 from robot_bench.report.explain.progress import ProgressAnalysis
 from robot_bench.report.explain.replay import ChipReset, SourcePlace
@@ -238,3 +238,9 @@ def test_how_seldom_a_program_reads_its_pins(reads_s: Sequence[float], gap_s: fl
         reads=lambda since, until: {"a": [round(t * S) for t in reads_s if since <= round(t * S) <= until]}
     )
     assert read_gap(SimpleNamespace(replay=replay), 12 * S) == round(gap_s * S)  # type: ignore[arg-type]
+
+
+def test_codes_between_two_times_are_those_of_either_motor() -> None:
+    record = driven_run((0.0, (1, 1)), (1.0, (2, 1)), (2.0, (2, 3)), (3.0, (0, 0)), until_s=1.0)
+    assert codes_between(record, S // 2, 2 * S) == [(S // 2, (1, 1)), (S, (2, 1)), (2 * S, (2, 3))]
+    assert codes_between(record, S, 2 * S - 1) == [(S, (2, 1))]
