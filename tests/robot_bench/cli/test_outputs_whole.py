@@ -5,11 +5,13 @@ import math
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from p2os.cli.main import run as p2os
-from robot_bench.events.codec import line_of
+from robot_bench.cli import sweep
+from robot_bench.events.codec import Json, line_of
 from robot_bench.events.kinds import PinEdge
 from tests.bluepill_sim.analysis.waveforms.captures import Analyser, random_run, seen, with_edges
 from tests.robot_bench.cli.test_compare_pins import vcd
@@ -89,3 +91,33 @@ def test_pins_compared(capsys: pytest.CaptureFixture[str]) -> None:
         )
     ))  # fmt: skip
     assert is_as_kept(lines, "outputs_of_pins")
+
+
+def swept(count: int, seeds: int) -> sweep.SweepResult:
+    """Runs with all that may come of one, at some rows of two parameters."""
+    rows, outcomes = [], list[Json]()
+    for number in range(count):
+        settings = (("start.x_m", 0.5 * (number // seeds)), ("robot.start.y_m", f"<{number // seeds}>"))
+        scenario = SimpleNamespace(name="mine", seed=number % seeds)
+        replay = sweep.command("mine.toml", ["--force"], settings, number % seeds)
+        rows.append(sweep.SweepRow(scenario=scenario, settings=settings, replay=replay))  # type: ignore[arg-type]
+        came = ([], ["it hit\x01 it", "and more"], ["not run"], ["interrupted (SIGINT)"], [])[number % 5]
+        outcomes.append({
+            "passed": not came, "failures": came, "virtual_s": 12.345, "distance_m": number * 1.005, "wall_s": number,
+            "min_clearance_m": None if number % 2 else 0.1239, "trace_sha256": f"{number // seeds:09x}", "body": "best",
+            "folder": f"runs/{number}" if number % 3 else None,
+        })  # fmt: skip
+    return sweep.SweepResult(rows, outcomes, count > 5, Path("runs"))
+
+
+def test_what_a_sweep_prints(capsys: pytest.CaptureFixture[str]) -> None:
+    lines = []
+    for count, seeds in ((1, 1), (5, 5), (12, 2), (120, 6)):
+        done = swept(count, seeds)
+        sweep.print_sweep(done)
+        sweep.write_junit(done, Path("junit.xml"))
+        lines += [f"{count} runs, {seeds} seeds", *capsys.readouterr().out.splitlines()]
+        if count <= 12:
+            lines += [*Path("junit.xml").read_text(encoding="utf-8").replace("><", ">\n<").splitlines(),
+                      json.dumps(sweep.as_json(done)), *sweep._places(done.rows)]  # fmt: skip
+    assert is_as_kept(lines, "outputs_of_a_sweep")

@@ -20,7 +20,12 @@ def shown(*values: float) -> str:
 
 def test_a_train_through_its_stages() -> None:
     lines = [shown(no_load_radps(rover()), box_inertia(1.4, 0.3, 0.2, 0.05))]
-    for parts in ({}, {"motor": {"friction_nm": 0.0, "damping_nm_s": 0.0}}, {"bridge": {"drop_v": 1.5}}):
+    changes: list[dict[str, dict[str, object]]] = [
+        {},
+        {"motor": {"friction_nm": 0.0, "damping_nm_s": 0.0}},
+        {"bridge": {"drop_v": 1.5}},
+    ]
+    for parts in changes:
         train = DriveTrain(rover(**parts), 1e-3)
         lines += [f"{parts} {shown(train.own, train.other)}"]
         for left, right in STAGES:

@@ -35,8 +35,8 @@ def lines_of(drive: Drive) -> Iterator[str]:
     yield from (f"  {name} {numbers(found.tolist())}" for name in latency_budget(drive).steps
                 if len(found := latency_budget(drive).of(name)))  # fmt: skip
     for reported in (False, True):
-        found = answers(drive, reported=reported)
-        yield f"  answers {numbers([(one.command_s, one.onset_s, one.latency_s) for one in found])}"
+        rows = [(one.command_s, one.onset_s, one.latency_s) for one in answers(drive, reported=reported)]
+        yield f"  answers {numbers(rows)}"
     for name, steps in (("motors", drive.motors), ("sensors", drive.sensors), ("sonar", drive.sonar_m)):
         rows = {key: [one.t_s.tolist()[:4], one.values.tolist()[:4]] for key, one in steps.items() if len(one.t_s) > 1}
         yield f"  {name} {numbers(rows)}"

@@ -240,6 +240,8 @@ def test_the_formulas_give_back_small_errors_of_their_own_derivation() -> None:
     assert e_b == pytest.approx(90 / (90 - math.degrees(alpha)))
     radius = side / 2 / math.sin(beta / 2)
     assert e_d == pytest.approx((radius + track / 2) / (radius - track / 2))
+    alike = np.array([0.1, 0.2]), np.array([0.1, -0.2])  # both ways round the same: wheels of one size
+    assert by_formulas(alike, side, track) == (1.0, pytest.approx(90 / (90 + math.degrees(0.3 / (4 * side)))))
 
 
 def squares(seed: int, runs: int, *, noise: bool) -> list[Drive]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from p2os.capture import write_recording
 from p2os.pioneer.world import load_world
+from p2os.pioneer.world.model import Pose
 from p2os.robots.parameters import load_parameters
 from robot_bench.drives.drive import Drive, Trajectory
 from robot_bench.experiments.fitting import examples
@@ -71,7 +72,7 @@ def test_what_an_example_is_made_of() -> None:
         lines += [*robot.texts.values(), str(robot.errors), str(examples.wandering(seed, 9.0))]
         stages = [*examples.wandering(seed, 2.0), *examples.square(clockwise=noise, side_mm=100)[:2]]
         found = examples.record(robot, load_world("room") if noise else examples.empty_world(), stages, seed=seed,
-                                camera=noise, start=None if noise else examples.Pose(1.0, 2.0, 0.5))  # fmt: skip
+                                camera=noise, start=None if noise else Pose(1.0, 2.0, 0.5))  # fmt: skip
         text = write_recording(found.capture)
         lines += [f"{len(found.capture.chunks)} chunks {hashlib.sha256(text.encode()).hexdigest()[:16]}"]
         lines += [" ".join(f"{value:.5g}" for value in pose) for pose in found.poses[::40]]

@@ -13,7 +13,7 @@ from robot_bench.wires.edges import Edges
 from tests.robot_bench.recording.records import S, motor_pins
 
 DISTANCES = tuple(f"DD{n}" for n in range(1, 9))
-#: Where the sensors look, degrees, and how the robot is told of.
+#: Where the sensors look, degrees, as the trace has it.
 HEADINGS = (90, 50, 30, 10, -10, -30, -50, -90)
 ROBOT = {"sonar": [[0.1, 0.0, heading * 0.0174533] for heading in HEADINGS], "sonar_cone_rad": 0.5}
 STEP_MPS = 0.0625
@@ -182,6 +182,6 @@ def answers(
     }  # fmt: skip
 
 
-def told(steps: Sequence[ChainLink]) -> list[str]:
+def step_lines(steps: Sequence[ChainLink]) -> list[str]:
     """Steps as lines."""
     return [f"  {step.t} {step.part} [{step.evidence}] {step.says}" for step in steps]

@@ -12,7 +12,15 @@ from robot_bench.report.explain.probing import Codes, InputEffect, SensorRespons
 from robot_bench.report.explain.scene import Scene
 from tests.robot_bench.recording.kept_lines import is_as_kept
 from tests.robot_bench.recording.records import S
-from tests.robot_bench.report.programs_asked import AHEAD, AskedProber, AskedReplay, answers, driven_run, poses, told
+from tests.robot_bench.report.programs_asked import (
+    AHEAD,
+    AskedProber,
+    AskedReplay,
+    answers,
+    driven_run,
+    poses,
+    step_lines,
+)
 
 HIT_S = 6.0
 #: What was touched lies ahead, a little to the left; the robot is at x 1.125 m then.
@@ -63,8 +71,8 @@ CASES = [
     Case(name="a thing that came into a blind spot as late as counts", on={}, hit=replace(HIT, x_m=0.7, y_m=-0.2),
          run={"changes": [WorldChange(t=5_400_000_000, op="place", name="crate", fields={})]}),
     Case(name="backwards", on={}, hit=replace(HIT, x_m=-1.4, y_m=0.0), legs=((0.0, (-3, -2)),)),
-    Case(name="no sensor told", on={}),
-    Case(name="no sensor told, though its sonar measured", on={},
+    Case(name="no sensor reported it", on={}),
+    Case(name="no sensor reported it, though its sonar measured", on={},
          run={"sonar": [(3 * S, [900] * 8), (5 * S, [800, 800, 800, 700, 400, 800]), (7 * S, [100] * 8)],
               "faults": [Fault(t=S, op="inject", words="sonar-dead 4")]}),
     Case(name="in sight too late for a sensor", on={},
@@ -146,7 +154,11 @@ def found(case: Case, prober: AskedProber | None, record: RunRecord) -> list[str
     analysis = ContactAnalysis(Scene(record), prober, case.hit)  # type: ignore[arg-type]
     finding = analysis.find()
     asked = [] if prober is None else [f"    asked {one}" for one in prober.asked]
-    return [f"{case.name}: {'cause' if finding.is_cause else 'known'}: {finding.says}", *told(analysis.steps), *asked]
+    return [
+        f"{case.name}: {'cause' if finding.is_cause else 'known'}: {finding.says}",
+        *step_lines(analysis.steps),
+        *asked,
+    ]
 
 
 def program(case: Case, record: RunRecord) -> AskedProber:

@@ -9,7 +9,7 @@ import pytest
 from robot_bench.events.kinds import Contact, Fault, Note, Verdict
 from robot_bench.recording.run_record import RunRecord
 from robot_bench.report.explain import explain as explaining
-from robot_bench.report.explain.findings import read_gap
+from robot_bench.report.explain.findings import codes_between, read_gap
 from robot_bench.report.explain.probing import Codes, SensorResponse
 from robot_bench.report.explain.progress import ProgressAnalysis
 from robot_bench.report.explain.replay import ChipReset, SourcePlace
@@ -24,7 +24,7 @@ from tests.robot_bench.report.programs_asked import (
     answers,
     driven_run,
     poses,
-    told,
+    step_lines,
 )
 
 STILL: Codes = (0, 0)
@@ -154,7 +154,11 @@ def said(case: Case, prober: AskedProber | None, record: RunRecord) -> list[str]
     analysis = ProgressAnalysis(Scene(record), prober, record.last_ns)  # type: ignore[arg-type]
     finding = analysis.find()
     asked = [] if prober is None else [f"    asked {one}" for one in prober.asked]
-    return [f"{case.name}: {'cause' if finding.is_cause else 'known'}: {finding.says}", *told(analysis.steps), *asked]
+    return [
+        f"{case.name}: {'cause' if finding.is_cause else 'known'}: {finding.says}",
+        *step_lines(analysis.steps),
+        *asked,
+    ]
 
 
 def test_each_link_that_keeps_a_robot_where_it_is() -> None:
@@ -170,7 +174,7 @@ def test_each_link_that_keeps_a_robot_where_it_is() -> None:
 def failing(failure: str, **changes: object) -> tuple[RunRecord, str]:
     """A run of 40 s that failed at 30 s."""
     says = failure.partition(": ")[2]
-    verdict = Verdict(t=30 * S, goal=0, says=says, met=False) if says else None
+    verdict = Verdict(t=30 * S, goal="it", says=says, met=False) if says else None
     fields = {"end": {"failures": [failure]}, "verdicts": [verdict] if verdict else [], **changes}
     return driven_run(*STANDS, until_s=40.0, **fields), failure
 
@@ -202,7 +206,7 @@ def test_what_else_fails_is_looked_into_by_its_kind() -> None:
         record.pins |= {net: Edges([(0, 0), (25 * S, 1)]) for net in ("DD2", "DD3")}
         prober = Case(name=name, replay=replay, program=program).prober(record)
         finding, steps = explaining._find(record, Scene(record), prober, failure)  # type: ignore[arg-type]
-        lines += [f"{name}: {'cause' if finding.is_cause else 'known'}: {finding.says}", *told(steps)]
+        lines += [f"{name}: {'cause' if finding.is_cause else 'known'}: {finding.says}", *step_lines(steps)]
         lines += [f"    asked {one}" for one in prober.asked]
     assert is_as_kept(lines, "explained_others")
 
@@ -234,3 +238,9 @@ def test_how_seldom_a_program_reads_its_pins(reads_s: Sequence[float], gap_s: fl
         reads=lambda since, until: {"a": [round(t * S) for t in reads_s if since <= round(t * S) <= until]}
     )
     assert read_gap(SimpleNamespace(replay=replay), 12 * S) == round(gap_s * S)  # type: ignore[arg-type]
+
+
+def test_codes_between_two_times_are_those_of_either_motor() -> None:
+    record = driven_run((0.0, (1, 1)), (1.0, (2, 1)), (2.0, (2, 3)), (3.0, (0, 0)), until_s=1.0)
+    assert codes_between(record, S // 2, 2 * S) == [(S // 2, (1, 1)), (S, (2, 1)), (2 * S, (2, 3))]
+    assert codes_between(record, S, 2 * S - 1) == [(S, (2, 1))]

@@ -91,7 +91,7 @@ def test_latencies() -> None:
 
 def effect(key: str, alone: tuple[float, ...], *found: float | None) -> ParameterEffect:
     names = ("mu", "mu_star", "mu_star_conf", "sigma", "S1", "S1_conf", "ST", "ST_conf")
-    return ParameterEffect(key=key, alone=alone, **dict(zip(names, found, strict=False)))  # type: ignore[arg-type]
+    return ParameterEffect(key=key, alone=alone, **dict(zip(names, found, strict=False)))
 
 
 ALONE = [effect("threshold_m", (0.1, 0.4, 0.2), -0.2, 0.25, 0.05, 0.1), effect("start.x_m", (), *[None] * 4)]

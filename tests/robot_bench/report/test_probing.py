@@ -20,7 +20,7 @@ class Looking(Prober):
     """A program that notices a change so long after it, while it looks, which is until a time."""
 
     def __init__(self, ends: int, after: int = NS_PER_MS) -> None:
-        self.sensors, self.ends, self.after = ("DD1", "DD2"), ends, after
+        self.sensors, self.ends, self.after = ["DD1", "DD2"], ends, after
         self.replay = SimpleNamespace(end=60 * NS_PER_S)  # type: ignore[assignment]  # as much of it as is asked
         self.spans = set[int]()
 

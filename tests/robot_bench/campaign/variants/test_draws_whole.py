@@ -1,4 +1,4 @@
-"""What a campaign draws: tables of things in a room, and points of searches that are told what came of them."""
+"""What a campaign draws: tables of things in a room, and points of searches that hear what came of them."""
 
 import math
 from collections.abc import Sequence
@@ -28,7 +28,7 @@ def test_where_things_of_each_kind_stand() -> None:
     assert is_as_kept(lines, "draws_of_things")
 
 
-def told(points: Sequence[tuple[float, ...]]) -> list[PointResult]:
+def answered(points: Sequence[tuple[float, ...]]) -> list[PointResult]:
     """A point reaches what its coordinates, in tenths, are; a third of them is excused."""
     return [
         PointResult(
@@ -50,5 +50,5 @@ def test_which_points_a_search_proposes(name: str) -> None:
             for _ in range(6):
                 points = search.ask(5)
                 lines += [f"  {' '.join(f'{at:.4f}' for at in point)} {search.is_drawn(point)}" for point in points]
-                search.tell(told(points))
+                search.tell(answered(points))
     assert is_as_kept(lines, f"draws_of_{name}")

@@ -56,7 +56,7 @@ def nominal_of(mode: str, experiment: str = "motors") -> tuple[Nominal, Scenario
 
 @dataclass(kw_only=True)
 class MadeRun:
-    """A robot whose wheels go at their ramps to what the pins say, and are told of by packets each 100 ms."""
+    """A robot whose wheels go at their ramps to what the pins say, and are reported by packets each 100 ms."""
 
     nominal: Nominal
     legs: Sequence[tuple[Pair, float]]
