@@ -75,25 +75,34 @@ FREE_LOW, FREE = (1, 2, 4, 5, 6), (1, 2, 4, 5, 6, 8, 9, 10, 11, 12)
 SRAM, CODE = 0x2000_1000, 0x0800_0000
 
 
-def narrow(rng: random.Random) -> list[int]:
+class Few(random.Random):
+    """A generator with few of the registers, so that instructions go on with what the ones before have made."""
+
+    def __init__(self, seed: int) -> None:
+        super().__init__(seed)
+        self.low = self.sample(FREE_LOW, 2)
+        self.all = [*self.low, self.choice(FREE)]
+
+
+def narrow(rng: Few) -> list[int]:
     """Return a 16-bit instruction whose meaning is known: shifts, sums, constants, pairs, copies and loads."""
-    d, n, m, most = rng.choice(FREE_LOW), rng.choice(FREE_LOW), rng.choice(FREE_LOW), rng.choice((1, 7, 31))
+    d, n, m, most = rng.choice(rng.low), rng.choice(rng.low), rng.choice(rng.low), rng.choice((1, 7, 31))
     five, byte = rng.randint(0, most), rng.choice((0, 1, 5, 255, rng.randrange(256)))
-    high = rng.choice(FREE)
+    high = rng.choice(rng.all)
     return [rng.choice((
         five << 6 | n << 3 | d, 0x0800 | five << 6 | n << 3 | d,
         rng.choice((0x1800, 0x1A00)) | m << 6 | n << 3 | d, rng.choice((0x1C00, 0x1E00)) | (five & 7) << 6 | n << 3 | d,
         rng.choice((0x2000, 0x3000, 0x3800)) | d << 8 | byte,
         0x4000 | rng.choice((0, 2, 3, 12, 14, 15)) << 6 | n << 3 | d,
         0x4280 | n << 3 | d, 0x2800 | d << 8 | byte,  # comparisons write nothing
-        0x4600 | (high & 8) << 4 | rng.choice(FREE) << 3 | high & 7,
+        0x4600 | (high & 8) << 4 | rng.choice(rng.all) << 3 | high & 7,
         0x6800 | five << 6 | 7 << 3 | d, 0x9800 | d << 8 | five,
     ))]  # fmt: skip
 
 
-def wide(rng: random.Random) -> list[int]:
+def wide(rng: Few) -> list[int]:
     """Return a 32-bit instruction whose meaning is known."""
-    d, n, m = (rng.choice(FREE) for _ in range(3))
+    d, n, m = (rng.choice(rng.all) for _ in range(3))
     constant = rng.randrange(2) << 26 | rng.randrange(8) << 12 | rng.randrange(1, 256)
     operation = rng.choice((0, 1, 2, 3, 8, 13)) << 21
     by = rng.randrange(8) << 12 | rng.randrange(4) << 6
@@ -106,19 +115,17 @@ def wide(rng: random.Random) -> list[int]:
     return [word >> 16, word & 0xFFFF]
 
 
-def changing(rng: random.Random) -> list[int]:
+def changing(rng: Few) -> list[int]:
     """Return what changes the value read, in R3: by a register, a constant, or bits put into it."""
-    m, operation = rng.choice(FREE), rng.choice((0, 1, 2)) << 21
+    m, operation = rng.choice(rng.all), rng.choice((0, 1, 2)) << 21
     constant = rng.randrange(2) << 26 | rng.randrange(8) << 12 | rng.randrange(1, 256)
     low = rng.randrange(32)
     insert = (low >> 2) << 12 | (low & 3) << 6 | rng.randrange(low, 32)
     word = rng.choice((
         0xEA03_0300 | operation | m, 0xEA00_0303 | operation & ~(1 << 21) | m << 16, 0xF003_0300 | operation | constant,
-        0xF360_0300 | rng.choice((*FREE, 15)) << 16 | insert,
+        0xF360_0300 | rng.choice((*rng.all, 15)) << 16 | insert,
     ))  # fmt: skip
-    return rng.choice(
-        ([0x4003 | rng.choice((0, 12, 14)) << 6 | rng.choice(FREE_LOW) << 3], [word >> 16, word & 0xFFFF])
-    )
+    return rng.choice(([0x4003 | rng.choice((0, 12, 14)) << 6 | rng.choice(rng.low) << 3], [word >> 16, word & 0xFFFF]))
 
 
 def before_the_store(program: bytes, registers: list[int], held: int, memory: bytes) -> list[int]:
@@ -138,12 +145,17 @@ def before_the_store(program: bytes, registers: list[int], held: int, memory: by
     return [*(core.reg_read(UC_ARM_REG_R0 + number) for number in range(13)), registers[13], 0]
 
 
-@pytest.mark.parametrize("seed", range(120))
+@pytest.mark.parametrize("seed", range(300))
 def test_what_is_forced_does_not_depend_on_what_was_there_and_the_rest_does(seed: int) -> None:
-    rng = random.Random(seed)
-    halves = [half for _ in range(rng.randint(1, 5)) for half in rng.choice((narrow, wide))(rng)]
+    rng = Few(seed)
+    # Constants first: what comes of them can be worked out, though their registers are gone when it is stored.
+    halves = [half for one in rng.all for half in (0xF240 | rng.randrange(2) << 10 | rng.randrange(16),
+                                                   rng.randrange(8) << 12 | one << 8 | rng.randrange(256))]  # fmt: skip
+    halves += [half for _ in range(rng.randint(0, 4)) for half in rng.choice((narrow, wide))(rng)]
     halves += rng.choice(([0x6803], [0xF8D0, 0x3000]))  # ldr r3, [r0]
-    halves += [half for _ in range(rng.randint(1, 2)) for half in changing(rng)]
+    for _ in range(rng.randint(1, 2)):
+        halves += changing(rng)
+        halves += [half for _ in range(rng.randint(0, 3)) for half in rng.choice((narrow, wide))(rng)]
     halves += rng.choice(([0x6003], [0xF8C0, 0x3000]))  # str r3, [r0]
     program = b"".join(half.to_bytes(2, "little") for half in halves)
     memory = rng.randbytes(0x1000)
@@ -164,3 +176,49 @@ def test_what_is_forced_does_not_depend_on_what_was_there_and_the_rest_does(seed
 
     assert all(seen[number] == ones[number] for number in seen if number < 16)
     assert forced_bits(program, others.__getitem__, CRL, named) == (bits, seen)
+
+
+#: Instructions that write register d, at a place of their code, something that is not worked out; from R4.
+UNKNOWN = {
+    "asrs": ("1060", 0), "ldr literal": ("4801", 8), "ldrb": ("7820", 0), "ldrh": ("8820", 0), "adcs": ("4160", 0),
+    "muls": ("4360", 0), "movt": ("F2C00005", 8), "ubfx": ("F3C40041", 8), "clz": ("FAB4F084", 8),
+    "mul": ("FB04F005", 8), "ldrb.w": ("F8940000", 12), "ldrh.w": ("F8B40000", 12),
+    "ror": ("EA4F0074", 8), "rsb": ("F1C40001", 8), "orn": ("F0640001", 8), "ldrb indexed": ("F8140001", 12),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", UNKNOWN)
+def test_what_an_instruction_makes_that_is_not_understood_is_unknown_and_what_it_leaves_is_not(name: str) -> None:
+    text, place = UNKNOWN[name]
+    for target, bits in ((1, 0), (2, 0x41), (5, 0x41)):
+        word = f"{int(text, 16) | target << place:0{len(text)}X}"
+        # movs r1, #0x41; …; ldr r3, [r0]; orrs r3, r1; movs r1, #0; str r3, [r0]
+        found = forced_bits(code(f"2141 {word[:4]} {word[4:]} 6803 430B 2100 6003"), REGISTERS.__getitem__, CRL, read)
+        assert found[0] == bits, target
+
+
+@pytest.mark.parametrize("text", ["4281", "2C01", "7021", "8021", "9401", "6021", "F1B40F01", "F8C41000", "EA940F05"])
+def test_what_only_compares_or_stores_leaves_every_register(text: str) -> None:
+    found = forced_bits(code(f"2141 {text[:4]} {text[4:]} 6803 430B 2100 6003"), REGISTERS.__getitem__, CRL, read)
+    assert found[0] == 0x41
+
+
+def test_a_store_through_the_stack_pointer_means_what_any_other_does() -> None:
+    for register in range(1, 8):
+        registers = [*[0] * 13, CRL - 12, 0]
+        # ldr rn, [sp, #12]; orr.w rn, rn, #6; str rn, [sp, #12]
+        text = (
+            f"{0x9803 | register << 8:04X} {0xF040 | register:04X} {register << 8 | 6:04X} {0x9003 | register << 8:04X}"
+        )
+        assert forced_bits(code(text), registers.__getitem__, CRL, read) == (6, {13: CRL - 12})
+
+
+def test_what_a_word_of_sram_holds_is_named_from_its_first_one_on_and_of_flash_not() -> None:
+    registers = [CRL, *[0] * 6, 0x2000_0000, *[0] * 7]
+    # ldr r1, [r7]; ldr r3, [r0]; orrs r3, r1; movs r1, #0; str r3, [r0]
+    for base, seen in ((0x2000_0000, {7: 0x2000_0000, 0x2000_0000: 9}), (0x1FFF_FFFC, {7: 0x1FFF_FFFC})):
+        registers[7] = base
+        found = forced_bits(
+            code("6839 6803 430B 2100 6003"), registers.__getitem__, CRL, lambda *_: (9).to_bytes(4, "little")
+        )
+        assert found == (9, {0: CRL, **seen})
