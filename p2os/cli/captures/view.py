@@ -22,11 +22,11 @@ MOST_MPS, MOST_DPS = 0.3, 45.0
 
 HELP = """View a run, capture, scenario or robot in the browser.
 
-TARGET is a run folder, a capture (pcap, recording, hex), a scenario, which runs
-in real time, or a robot's URL. A robot is not moved unless --drive is given:
-then keys, the stick or a pad drive it while held. It stops on release, on
-leaving the page, or when the page falls silent. The page is served to this
-machine only and its link holds a token. Ctrl-C ends it.
+TARGET is a folder of a run or a campaign, a capture (pcap, recording, hex), a
+scenario, which runs in real time, or a robot's URL. A robot is not moved unless
+--drive is given: then keys, the stick or a pad drive it while held. It stops on
+release, on leaving the page, or when the page falls silent. The page is served
+to this machine only and its link holds a token. Ctrl-C ends it.
 
 \b
 Examples:

@@ -13,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Protocol
 
+from p2os.cli.robots.command_queue import is_stop
 from p2os.cli.robots.drive_deadman import DriveDeadman
 from p2os.cli.robots.page_control import QueuedControl
 from p2os.client import Link
@@ -68,11 +69,10 @@ class PageDriver(QueuedControl):
         """Wait for a command, no longer than a turn; have the robot drive as is wanted then."""
         self._gaps.expect(self._clock() + wait_ns)
         command = self._commands.take(wait_ns / NS_PER_S)
-        now = self._clock()
+        now, was_driving = self._clock(), self._deadman.is_driving
         if self._gaps.gap(now):
             self._deadman.stop()  # this machine slept: what waited means nothing, but for stops
-            command = command if command is not None and command.do == "stop" else None
-        was_driving = self._deadman.is_driving
+            command = command if command is not None and is_stop(command) else None
         trouble = "" if command is None else self._take(command, now)
         self._deadman.advance_to(now)
         self._hear()

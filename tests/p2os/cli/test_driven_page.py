@@ -16,6 +16,7 @@ from p2os.cli.robots.driven_page import TURN_NS, PageDriver
 from p2os.client import Link
 from p2os.client.notices import DeadmanStopped, LinkLostError, Notice
 from p2os.view.run_control import DRIVE_HOLD_NS, RunCommand
+from simbase.timing import NS_PER_S
 from tests.p2os.cli.driven import AT_ONCE_S, COMMAND, STOP, VEL, RecordingRobot
 
 DRIVE = RunCommand(do="drive", forward_mps=0.2, turn_dps=30.0)
@@ -80,6 +81,24 @@ def test_it_stops_when_nothing_is_heard_of_a_page_and_what_is_held_still_means_n
     assert driven.turn(DRIVE) == []
     assert "press anew" in driven.driver.state.why
     assert driven.turn(LET_GO, DRIVE) == [(0.2, 30.0)]
+
+
+@pytest.mark.parametrize(("waited", "then"), [(LET_GO, [(0.2, 30.0)]), (DRIVE, []), (HALT, [])])
+def test_of_what_waited_while_the_machine_slept_only_what_stops_counts(
+    waited: RunCommand, then: list[object], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    driven = Driven()
+    driven.turn(DRIVE)
+    commands = driven.driver._commands
+
+    def taken_after_a_sleep(_wait_s: float) -> RunCommand | None:
+        driven.now += 3600 * NS_PER_S
+        return commands._stops.popleft() if commands._stops else commands._others.popleft()
+
+    with monkeypatch.context() as asleep:
+        asleep.setattr(commands, "take", taken_after_a_sleep)
+        assert driven.turn(waited) == ["stop"]
+    assert driven.turn(DRIVE) == then
 
 
 def test_stop_stops_whoever_drives_and_finds_room_whatever_waits() -> None:

@@ -112,6 +112,11 @@ export class Store {
     return (OF_ALL.has(kind) ? this.header.value.channels : this.chosen).filter((channel) => channel.kind === kind);
   }
 
+  /** Whether the run can be set back and read: robots that share a world go on, and nobody reads their programs. */
+  get canGoBack(): boolean {
+    return (this.run.value?.futures.length ?? 0) > 0;
+  }
+
   /** What hands can do here, to the robot that is chosen where there are several; null: nothing. */
   get handsOffer(): HandsOffer | null {
     const { hands, robot_hands } = this.header.value;

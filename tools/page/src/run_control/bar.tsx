@@ -19,8 +19,7 @@ export function RunBar({ app }: { app: App }) {
     bar.current?.querySelector<HTMLElement>("[aria-expanded=true]")?.focus();
     setOpen("");
   };
-  // Robots that share a world go on, and have no futures.
-  const canGoBack = run.futures.length > 0;
+  const { canGoBack } = store;
   useEffect(() => { if (!canGoBack) app.unit.value = "millisecond"; }, [canGoBack]);
   const said = run.trouble || (run.is_running ? "" : [isHere ? run.why : `the run stands at ${moment(run.head_ns)}`, isHere ? run.place : ""].filter(Boolean).join(" · "));
   return (

@@ -12,7 +12,7 @@ export function Variables({ app }: { app: App }) {
     const timer = setTimeout(() => store.offer(words), TYPED_MS);
     return () => clearTimeout(timer);
   }, [words]);
-  if (!run || !app.controls) return null;
+  if (!run || !app.controls || !store.canGoBack) return null;
   const add = (event: Event) => {
     event.preventDefault();
     if (words.trim()) app.ask({ do: "watch", words: words.trim() });

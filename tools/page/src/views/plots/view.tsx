@@ -18,7 +18,7 @@ const STROKES: readonly { width: number; dash: number[] }[] = [{ width: 2.6, das
 
 export const plots: ViewKind = {
   id: "plots", title: "Plots", doc: "Numbers over time with their units: speeds, ranges, voltages, variables of the program.",
-  has: (store) => chartsOf(store).length > 0 || (store.mayControl.value && store.run.value !== null && !store.header.value.hands?.is_real), // variables are chosen here
+  has: (store) => chartsOf(store).length > 0 || (store.mayControl.value && store.canGoBack && !store.header.value.hands?.is_real), // variables are chosen here
   mount: (app, host) => {
     const list = document.createElement("div"), variables = document.createElement("div");
     list.className = "plot-list";
