@@ -57,6 +57,9 @@ class LineDifference:
 def line_differences(ours: Image, theirs: Image) -> list[LineDifference]:
     """Return the lines that differ, of functions that both have; none where one has no debug information.
 
+    A function that ours has no code of is among them where some of its lines have code elsewhere: it is not left out
+    but empty, or part of others.
+
     Raises:
         ImageError: The debug information of one is damaged.
     """
@@ -64,6 +67,8 @@ def line_differences(ours: Image, theirs: Image) -> list[LineDifference]:
     found, differences = [], code_differences(ours, theirs)
     for name in dict.fromkeys(one.function for one in differences):
         pair = mine.functions.get(name), other.functions.get(name)
+        if pair[0] is None and pair[1] is not None and (gone := _emptied(pair[1], tables)):
+            found.append(LineDifference(name, (), gone))
         if pair[0] is None or pair[1] is None:
             continue
         one, two = (_by_line(version, table) for version, table in zip(pair, tables, strict=True) if version)
@@ -195,6 +200,13 @@ def _by_line(version: _Function, table: LineTable) -> list[tuple[tuple[str, int]
         if place is not None:
             found.setdefault(place, []).append(plain)
     return sorted((place, tuple(sorted(code))) for place, code in found.items())
+
+
+def _emptied(gone: _Function, tables: tuple[LineTable, LineTable]) -> tuple[tuple[str, int], ...]:
+    """Return the lines of a function that ours lacks, where ours has code of a line of it; none where it has not."""
+    theirs = sorted({place for at in gone.addresses if (place := _place(tables[1], at)) is not None})
+    ours = {(row.file.rsplit("/", 1)[-1], row.line) for row in tables[0].rows}
+    return tuple(theirs) if theirs and any(theirs[0] <= place <= theirs[-1] for place in ours) else ()
 
 
 def _by_registers(differences: Sequence[CodeDifference], tables: tuple[LineTable, LineTable]) -> list[LineDifference]:

@@ -123,6 +123,13 @@ def test_a_function_that_one_version_lacks_is_named(good: Image, tmp_path: Path)
     assert "print_transition" not in {one.function for one in line_differences(bad, good)}
 
 
+def test_a_function_that_is_empty_now_differs_and_its_call_too(good: Image, tmp_path: Path) -> None:
+    source = (HERE / SOURCE).read_text()
+    body = source[source.index("    if (way <= dodge->back_way") : source.index("static struct dodge_command command")]
+    bad = built(tmp_path, body, "}\n\n")
+    assert {one.function for one in line_differences(bad, good)} == {"back_on", "dodge_tick"}
+
+
 def test_without_debug_information_there_are_no_lines(good: Image, tmp_path: Path) -> None:
     if shutil.which("arm-none-eabi-strip") is None:
         pytest.skip("no binutils")

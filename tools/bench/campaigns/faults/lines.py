@@ -5,7 +5,8 @@
 FOLDER has the programs (`draw.py --build FOLDER`). The failure that `search.py FOLDER` has left is taken; where there
 is none, a campaign's folder of so many points is made beside the program, which a later call takes. `--back` changes
 the program back in place of naming a good version. A line is printed for each: what was said, and whether the planted
-line is among the lines that it names (`right`), is not (`wrong`), or none is named.
+line is among the lines that it names (`right`), uses the macro that is wrong there (`used`), is not (`wrong`), or none
+is named (`unknown`).
 """
 
 import argparse
@@ -56,7 +57,7 @@ def by_failure(name: str, folder: Path, good: Path) -> dict[str, str] | None:
 
 
 def judged(found: dict[str, str], fault: draw.DrawnFault) -> str:
-    """Return whether what was said names the planted line."""
+    """Return whether what was said names the planted line; `used`: a line that uses the macro which is wrong."""
     if not found.get("line"):
         return "unknown"
     file, _, lines = found["line"].rpartition(":")
@@ -64,7 +65,19 @@ def judged(found: dict[str, str], fault: draw.DrawnFault) -> str:
     lengths = fault.right.count("\n")
     planted = range(fault.line, fault.line + lengths + 1)
     is_named = any(int(first) <= line <= int(last or first) for first, _, last in spans for line in planted)
-    return "right" if is_named and Path(file).name == fault.file else "wrong"
+    if is_named and Path(file).name == fault.file:
+        return "right"
+    macro = re.match(r"#define (\w+)", _text_of(fault.file, fault.line))
+    named = " ".join(
+        _text_of(file, line) for first, _, last in spans for line in range(int(first), int(last or first) + 1)
+    )
+    return "used" if macro and re.search(rf"\b{macro[1]}\b", named) else "wrong"
+
+
+def _text_of(file: str, line: int) -> str:
+    """Return a line of a source of the programs; nothing where it is no source of theirs."""
+    path = HERE / Path(file).name
+    return path.read_text(encoding="utf-8").splitlines()[line - 1] if path.is_file() else ""
 
 
 def _p2os(*arguments: str) -> str:
