@@ -17,7 +17,6 @@ from robot_bench.cli import check
 from robot_bench.scenario.json_schema import scenario_schema
 from robot_bench.scenario.loading import known_scenarios, load_scenario, read_scenario
 from simbase.errors import UsageError
-from tests.robot_bench.recording.kept_lines import is_as_kept
 
 SCHEMA = scenario_schema()
 TYPES = {"string": str, "number": (int, float), "integer": int, "boolean": bool, "object": dict, "array": list}
@@ -35,18 +34,6 @@ ends_run = "met"
 at_s = 1.0
 fault = "reboot"
 """
-
-
-def without_words(schema: Any) -> Any:
-    """Return a schema without what is for readers."""
-    if isinstance(schema, dict):
-        return {key: without_words(value) for key, value in schema.items() if key != "description"}
-    return [*map(without_words, schema)] if isinstance(schema, list) else schema
-
-
-def test_every_key_has_the_bounds_and_the_default_that_are_kept() -> None:
-    found = json.dumps(without_words(SCHEMA), sort_keys=True, indent=0).replace("{\n", "{")
-    assert is_as_kept(found.splitlines(), "scenario_schema")
 
 
 def fits(value: Any, schema: dict[str, Any]) -> bool:
