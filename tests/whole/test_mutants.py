@@ -221,6 +221,20 @@ def test_a_file_of_tests_says_by_its_helpers_and_its_data_too(tmp_path: Path) ->
     assert nearest.made_of("tests/walks/test_other.py") == tuple(f"tests/walks/{name}" for name in others)
 
 
+def test_near_to_a_file_that_no_test_names_is_who_tests_what_it_imports(tmp_path: Path) -> None:
+    for name, text in (
+        ("pack/verbs/check.py", "def f():\n    from pack.judge import a, b\n    import other.thing\n"),
+        ("tests/pack/test_one.py", "from pack.judge import a\n"),
+        ("tests/pack/test_other.py", "from pack.judge import a, b\n"),
+        ("tests/whole/test_third.py", "import other.thing\n"),
+    ):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    nearest = Nearest(tmp_path, {})
+    assert nearest.of("pack/verbs/check.py", 2) == ("tests/pack/test_other.py", "tests/pack/test_one.py")
+    assert nearest.of("pack/verbs/gone.py", 1) == ()
+
+
 def test_the_nearest_tests_come_first_but_for_one_that_takes_much_longer() -> None:
     files = ("a", "b", "c")
     assert cheapest_first(files, {}) == files

@@ -91,7 +91,19 @@ class Nearest:
 
     def _by_name(self, path: str) -> list[str]:
         module = path.removesuffix("/__init__.py").removesuffix(".py").replace("/", ".")
-        return _ordered({name: self._distance(path, module, name) for name in self._tests})
+        found = _ordered({name: self._distance(path, module, name) for name in self._tests})
+        return found or self._by_parts(path)
+
+    def _by_parts(self, path: str) -> list[str]:
+        """Return who imports what a file itself imports, the most of it first: a verb is tried by its command line."""
+        file = self._root / path
+        parts = (
+            {name for name in _imports(file) if name.startswith(f"{path.partition('/')[0]}.")}
+            if file.exists()
+            else {*()}
+        )
+        shared = {name: len(parts & self._imported_by(name)) for name in self._tests}
+        return _ordered({name: (-count,) if count else None for name, count in shared.items()})
 
     def _distance(self, path: str, module: str, test: str) -> tuple[int, ...] | None:
         """Return how far a file of tests stands from a module: its mirror, its folder, who imports it."""

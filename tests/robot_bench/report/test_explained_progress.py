@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from robot_bench.events.kinds import Contact, Fault, Note, Verdict
+from robot_bench.events.kinds import Contact, Fault, Note, Verdict, WorldChange
 from robot_bench.recording.run_record import RunRecord
 from robot_bench.report.explain import explain as explaining
 from robot_bench.report.explain.findings import codes_between, read_gap
@@ -244,3 +244,16 @@ def test_codes_between_two_times_are_those_of_either_motor() -> None:
     record = driven_run((0.0, (1, 1)), (1.0, (2, 1)), (2.0, (2, 3)), (3.0, (0, 0)), until_s=1.0)
     assert codes_between(record, S // 2, 2 * S) == [(S // 2, (1, 1)), (S, (2, 1)), (2 * S, (2, 3))]
     assert codes_between(record, S, 2 * S - 1) == [(S, (2, 1))]
+
+
+@pytest.mark.parametrize(
+    ("changes_s", "since_s"),
+    [((), 4.0), ((3.0,), 4.0), ((5.0,), 5.0), ((6.0, 9.0), 9.0), ((9.0, 6.0), 9.0), ((12.0, 12.1), 12.0)],
+)
+def test_a_thing_stands_since_it_was_last_changed_before_it_was_touched(
+    changes_s: Sequence[float], since_s: float
+) -> None:
+    changes = [WorldChange(t=round(t * S), op="move", name="crate", fields={}) for t in changes_s]
+    changes.append(WorldChange(t=11 * S, op="move", name="other", fields={}))
+    scene = Scene(driven_run(*STANDS, until_s=1.0, changes=changes))
+    assert scene.still_since(HIT, 4 * S) == round(since_s * S)

@@ -3,6 +3,7 @@
 What a bound is and where a window ends is tested goal by goal; here is how all of it comes together.
 """
 
+import json
 import math
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -17,6 +18,7 @@ from robot_bench.events.kinds import (
 )
 from robot_bench.scenario.goals.judging import GoalJudge, RunEnd, load_goal
 from robot_bench.scenario.goals.kinds import every_kind
+from robot_bench.scenario.json_schema import scenario_schema
 from robot_bench.scenarios import encoders, sensors
 from tests.robot_bench.recording.kept_lines import is_as_kept
 from tests.robot_bench.recording.long_run import LONG_S, long_run
@@ -183,3 +185,15 @@ def test_goal_encoder_counts_match_takes_the_nearest_pose(events: list[Event], f
         watch.feed(event)
     found = watch.finish(10 * S)
     assert (found.met, found.says) == (not failure, failure)
+
+
+def without_words(schema: Any) -> Any:
+    """Return a schema without what is for readers."""
+    if isinstance(schema, dict):
+        return {key: without_words(value) for key, value in schema.items() if key != "description"}
+    return [*map(without_words, schema)] if isinstance(schema, list) else schema
+
+
+def test_every_key_has_the_bounds_and_the_default_that_are_kept() -> None:
+    found = json.dumps(without_words(scenario_schema()), sort_keys=True, indent=0).replace("{\n", "{")
+    assert is_as_kept(found.splitlines(), "scenario_schema")
