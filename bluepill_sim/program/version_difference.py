@@ -204,9 +204,14 @@ def _by_line(version: _Function, table: LineTable) -> list[tuple[tuple[str, int]
 
 def _emptied(gone: _Function, tables: tuple[LineTable, LineTable]) -> tuple[tuple[str, int], ...]:
     """Return the lines of a function that ours lacks, where ours has code of a line of it; none where it has not."""
-    theirs = sorted({place for at in gone.addresses if (place := _place(tables[1], at)) is not None})
+    places = [place for at in gone.addresses if (place := _place(tables[1], at)) is not None]
+    if not places:
+        return ()
+    file = places[-1][0]  # where it ends; it may begin with what is inlined from a header
+    own = sorted({line for name, line in places if name == file})
     ours = {(row.file.rsplit("/", 1)[-1], row.line) for row in tables[0].rows}
-    return tuple(theirs) if theirs and any(theirs[0] <= place <= theirs[-1] for place in ours) else ()
+    is_there = any((file, line) in ours for line in range(own[0], own[-1] + 1))
+    return tuple(sorted(set(places))) if is_there else ()
 
 
 def _by_registers(differences: Sequence[CodeDifference], tables: tuple[LineTable, LineTable]) -> list[LineDifference]:

@@ -121,6 +121,9 @@ def test_a_function_that_one_version_lacks_is_named(good: Image, tmp_path: Path)
     alone = [one for one in code_differences(bad, good) if one.function == "print_transition"]
     assert [(bool(one.ours), bool(one.theirs)) for one in alone] == [(False, True)]
     assert "print_transition" not in {one.function for one in line_differences(bad, good)}
+    (tmp_path / "put").mkdir()
+    no_put = built(tmp_path / "put", "        put(*text++);\n", "        text++;\n", "uart.c")  # begins in a header
+    assert "put" not in {one.function for one in line_differences(no_put, good)}
 
 
 def test_a_function_that_is_empty_now_differs_and_its_call_too(good: Image, tmp_path: Path) -> None:
