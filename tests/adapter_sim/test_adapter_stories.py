@@ -107,7 +107,7 @@ def searches(rig: Rig, robot: FakeRobot) -> None:
         rig.events.append((rig.now, "speed", f"{rig.adapter.baud} bit/s"))
 
 
-TOLD: dict[str, tuple[Callable[[Rig, FakeRobot], None], AdapterSettings]] = {
+STORY_ROWS: dict[str, tuple[Callable[[Rig, FakeRobot], None], AdapterSettings]] = {
     "drives": (drives, AdapterSettings(threshold_um=603_000)),
     "drives-otherwise": (drives, AdapterSettings(
         bit_order=BitOrder.COMM1_MSB, motor_meaning=MotorMeaning.LINEAR_ANGULAR, max_velocity_mm_s=150,
@@ -121,9 +121,9 @@ TOLD: dict[str, tuple[Callable[[Rig, FakeRobot], None], AdapterSettings]] = {
 }  # fmt: skip
 
 
-def told(name: str) -> str:
+def story_text(name: str) -> str:
     """Return a story: what the adapter did at which time, in the order of times, and what it knows in the end."""
-    story, settings = TOLD[name]
+    story, settings = STORY_ROWS[name]
     robot = FakeRobot()
     rig = Rig(settings, robot)
     story(rig, robot)
@@ -134,12 +134,12 @@ def told(name: str) -> str:
     return "\n".join([*rows, str(rig.adapter.status).replace(", ", ",\n  ")]) + "\n"
 
 
-@pytest.mark.parametrize("name", TOLD)
+@pytest.mark.parametrize("name", STORY_ROWS)
 def test_a_story_goes_as_it_went(name: str) -> None:
-    assert told(name) == (STORIES / f"{name}.txt").read_text(encoding="utf-8")
+    assert story_text(name) == (STORIES / f"{name}.txt").read_text(encoding="utf-8")
 
 
 if __name__ == "__main__":
     STORIES.mkdir(exist_ok=True)
-    for each in TOLD:
-        (STORIES / f"{each}.txt").write_text(told(each), encoding="utf-8")
+    for each in STORY_ROWS:
+        (STORIES / f"{each}.txt").write_text(story_text(each), encoding="utf-8")

@@ -61,11 +61,11 @@ VERBS = {
 
 def answer(words: str, folder: Path) -> str:
     """Return what a verb answers: its exit code, both its outputs, and the files that it writes."""
-    said, told = (io.TextIOWrapper(io.BytesIO(), encoding="utf-8", write_through=True) for _ in range(2))
+    said, warned = (io.TextIOWrapper(io.BytesIO(), encoding="utf-8", write_through=True) for _ in range(2))
     given = [_file(word) if word.endswith(".elf") else word.replace("OUT", str(folder)) for word in shlex.split(words)]
-    with contextlib.redirect_stdout(said), contextlib.redirect_stderr(told):
+    with contextlib.redirect_stdout(said), contextlib.redirect_stderr(warned):
         code = run(given)
-    outputs = [stream.buffer.getvalue().decode().replace("\r", "<CR>") for stream in (said, told)]
+    outputs = [stream.buffer.getvalue().decode().replace("\r", "<CR>") for stream in (said, warned)]
     parts = [f"$ p2os mcu {words}: {code}\n{outputs[0]}", f"--- stderr\n{outputs[1]}"]
     for path in sorted(each for each in folder.rglob("*") if each.is_file()):
         name = path.relative_to(folder).as_posix()
