@@ -20,11 +20,10 @@ if TYPE_CHECKING:
 
 
 def run_target(named: str) -> ViewTarget | None:
-    """Return a run folder, of one robot or of several, or a campaign's; None where it is none.
+    """Return a run folder, of one robot or of several; None where it is none.
 
     Raises:
         TraceError: Its trace is damaged.
-        FileError: A campaign's report is, or it has none yet.
     """
     folder = Path(named)
     if (folder / TRACE_NAME).is_file():
@@ -33,20 +32,12 @@ def run_target(named: str) -> ViewTarget | None:
             if found is None:
                 return _read_target(folder)
         return ViewTarget(source=StillRecording(found), run=_get_ready)
-    return _target_of_all(folder) or _campaign_target(folder)
+    return _target_of_all(folder)
 
 
 def _get_ready() -> None:
     """Load what a closer look at packets needs, while the browser still opens the page."""
     import_module("p2os.view.packet_rows")
-
-
-def _campaign_target(folder: Path) -> ViewTarget | None:
-    if not folder.is_dir():
-        return None
-    from robot_bench.cli.shown.campaign_page import campaign_target
-
-    return campaign_target(folder)
 
 
 def _read_target(folder: Path) -> ViewTarget:

@@ -12,9 +12,10 @@ from p2os.view.header import PageHeader, PagePlan, PageSection
 from p2os.view.live import ShownSource
 from p2os.view.page import document, header_in
 from p2os.view.run_control import RunCommand, RunState
-from robot_bench.cli.shown import campaign_page
-from robot_bench.cli.shown.campaign_page import MOST_OPENED, CampaignPage
-from robot_bench.cli.shown.targets import run_target
+from robot_bench.campaign import journal
+from robot_bench.cli.campaigns import campaign_page
+from robot_bench.cli.campaigns.campaign_page import MOST_OPENED, CampaignPage
+from robot_bench.cli.campaigns.viewed_campaign import JOURNAL, campaign_target
 from robot_bench.report.make import Files
 from robot_bench.run import run_scenario
 from robot_bench.scenario.loading import load_scenario
@@ -63,7 +64,7 @@ def served(source: ShownSource, host: str, port: int) -> Iterator[SimpleNamespac
 
 
 def control_of(folder: Path) -> CampaignPage:
-    target = run_target(str(folder))
+    target = campaign_target(str(folder))
     assert target is not None
     assert target.source.recording.header == HEADER
     assert isinstance(target.source.control, CampaignPage)
@@ -112,11 +113,12 @@ def test_no_more_runs_are_served_than_there_may_be(folder: Path, monkeypatch: py
 
 def test_a_campaign_without_a_report_or_with_a_damaged_one_says_what_to_do(folder: Path) -> None:
     assert header_in(document(HEADER)) == HEADER
+    assert journal.NAME == JOURNAL
     (folder / "summary.json").write_text("{}", encoding="utf-8")
     with pytest.raises(FileError, match="damaged report"):
-        run_target(str(folder))
+        campaign_target(str(folder))
     (folder / "report.html").unlink()
     with pytest.raises(FileError, match="no report yet"):
-        run_target(str(folder))
+        campaign_target(str(folder))
     (folder / "journal.jsonl").unlink()
-    assert run_target(str(folder)) is None
+    assert campaign_target(str(folder)) is None

@@ -19,7 +19,6 @@ from p2os.view.page import header_in
 from p2os.view.recording import ViewRecording
 from p2os.view.run_control import OpenedRun, RunCommand, RunState
 from p2os.view.targets import ViewTarget, served, target_of
-from robot_bench.campaign.journal import NAME as JOURNAL
 from robot_bench.campaign.results import FAILURES
 from robot_bench.campaign.whole import PAGE, SUMMARY
 from robot_bench.recording.run_folder import make_next_folder
@@ -41,14 +40,12 @@ class FailedPoint:
     sha256: str
 
 
-def campaign_target(folder: Path) -> ViewTarget | None:
-    """Return a campaign's folder; None where it is none.
+def target_in(folder: Path) -> ViewTarget:
+    """Return a campaign's folder.
 
     Raises:
         FileError: It has no report yet, or a damaged one.
     """
-    if not (folder / JOURNAL).is_file():
-        return None
     if not (folder / PAGE).is_file():
         raise FileError(f"{folder} has no report yet", hint=f"p2os campaign --resume {folder}")
     try:
