@@ -23,7 +23,7 @@ NEEDS = (
         name="studies",
         kind="plug-in",
         feature="campaign, compare, fit, explain",
-        points=("robot_bench.explainers",),
+        points=("robot_bench.explainers", "p2os.view_sources"),
         point="explain",
     ),
     Need(name="robot_bench._edges", kind="built", feature="wires of a run"),
