@@ -111,7 +111,7 @@ def test_frames_of_other_channels_are_not_shown(folder: Path, monkeypatch: pytes
 #: What `p2os view` loads for a run that was kept, and what takes so long that it may not be among it.
 LOADED = (
     "p2os.cli.captures.view", "p2os.cli.robots.viewed_robot", "robot_bench.cli.shown.targets",
-    "p2os.view.server.serving", "robot_bench.cli.campaigns.viewed_campaign",
+    "p2os.view.server.serving",
 )  # fmt: skip
 HEAVY = ("bluepill_sim", "p2os.capture", "p2os.client", "p2os.pioneer", "robot_bench.events")
 
