@@ -111,10 +111,10 @@ await wires.waitForTimeout(100);
 found.zoomed = await state(wires);
 await wires.context().close();
 
-// Accessibility, wide and narrow, light and dark.
-async function complain(looked, where) {
+// Accessibility, wide and narrow, light and dark; of a page that was looked at, only the view that another tab shows.
+async function complain(looked, where, part = "html") {
   await looked.waitForTimeout(150);
-  const violations = await looked.evaluate(async () => (await axe.run(document, { resultTypes: ["violations"] })).violations.map((one) => `${one.id}: ${one.nodes[0].html.slice(0, 160)}`));
+  const violations = await looked.evaluate(async (within) => (await axe.run(within, { resultTypes: ["violations"] })).violations.map((one) => `${one.id}: ${one.nodes[0].html.slice(0, 160)}`), part);
   found.complaints.push(...violations.map((one) => `${where}: ${one}`));
   if (await looked.evaluate(() => document.documentElement.scrollWidth > innerWidth)) found.complaints.push(`${where}: wider than the screen`);
 }
@@ -122,9 +122,9 @@ for (const [width, colorScheme, layout] of [[1400, "light", "student"], [1400, "
   const looked = await open(`layout=${layout}`, { viewport: { width, height: 900 }, colorScheme, bypassCSP: true });
   await looked.evaluate(axe);
   if (layout) await complain(looked, `${width} ${colorScheme} ${layout}`);
-  else for (const tab of await looked.getByRole("tab").all()) {
+  else for (const [number, tab] of (await looked.getByRole("tab").all()).entries()) {
     await tab.click();
-    await complain(looked, `${width} ${colorScheme} ${await tab.textContent()}`);
+    await complain(looked, `${width} ${colorScheme} ${await tab.textContent()}`, number ? "#tab-panel" : "html");
   }
   await looked.context().close();
 }
