@@ -1,12 +1,7 @@
-"""Whole stories of the adapter: every edge, frame and event of some sessions, with its time.
-
-`python -m tests.adapter_sim.test_adapter_stories` writes them anew, after a change that means them to differ; the
-difference is read as any other change is.
-"""
+"""Whole stories of the adapter: every edge, frame and event of some sessions, with its time."""
 
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -16,8 +11,9 @@ from adapter_sim.settings import AdapterSettings, EncoderAtOpen, MotorCommand, M
 from p2os.gamepad import PadReport
 from p2os.protocol.sip import SonarReading
 from tests.adapter_sim.conftest import MS, FakeRobot, Rig
+from tests.tools.suite.golden import kept_in
 
-STORIES = Path(__file__).parents[1] / "golden" / "adapter"
+is_as_kept = kept_in("adapter")
 
 
 def drives(rig: Rig, robot: FakeRobot) -> None:
@@ -136,10 +132,4 @@ def story_text(name: str) -> str:
 
 @pytest.mark.parametrize("name", STORY_ROWS)
 def test_a_story_goes_as_it_went(name: str) -> None:
-    assert story_text(name) == (STORIES / f"{name}.txt").read_text(encoding="utf-8")
-
-
-if __name__ == "__main__":
-    STORIES.mkdir(exist_ok=True)
-    for each in STORY_ROWS:
-        (STORIES / f"{each}.txt").write_text(story_text(each), encoding="utf-8")
+    assert is_as_kept(story_text(name).splitlines(), name)

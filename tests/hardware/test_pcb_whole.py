@@ -1,8 +1,4 @@
-"""What the board's checks compute and say, whole: every figure, deck, finding and line about a wrong circuit.
-
-`python -m tests.hardware.test_pcb_whole` writes it anew, after a change that means it to differ; the difference is read
-as any other change is.
-"""
+"""What the board's checks compute and say, whole: every figure, deck, finding and line about a wrong circuit."""
 
 import hashlib
 from collections.abc import Callable
@@ -18,8 +14,9 @@ from hardware.pcb.proof.expected import differences
 from hardware.pcb.proof.mutants import apply, draw, draw_whole, load
 from hardware.pcb.spice import run
 from hardware.pcb.spice.decks import decks
+from tests.tools.suite.golden import kept_in
 
-ANSWERS = Path(__file__).parents[1] / "golden" / "hardware"
+is_as_kept = kept_in("hardware")
 
 
 def figures() -> list[str]:
@@ -62,17 +59,6 @@ WHOLE: dict[str, Callable[[], list[str]]] = {
 }  # fmt: skip
 
 
-def text(name: str) -> str:
-    """Return the lines of one of them."""
-    return "".join(f"{line}\n" for line in WHOLE[name]())
-
-
 @pytest.mark.parametrize("name", WHOLE)
 def test_it_is_what_it_was(name: str) -> None:
-    assert text(name) == (ANSWERS / f"{name}.txt").read_text(encoding="utf-8")
-
-
-if __name__ == "__main__":
-    ANSWERS.mkdir(exist_ok=True)
-    for each in WHOLE:
-        (ANSWERS / f"{each}.txt").write_text(text(each), encoding="utf-8")
+    assert is_as_kept(WHOLE[name](), name)

@@ -108,9 +108,10 @@ episode is approved in `approved.json`. A walk says that a model does what it di
 that this is right: that is for rows and tests. Who changes a model writes the traces at both commits, reads the
 difference, and approves it with the change:
 
-    python -m tests.bluepill_sim.peripherals.walks.approved --write before    # and, changed, --write behind
+    WALKS=$(echo tests/bluepill_sim/peripherals/walks/test_*.py)
+    python -m tests.tools.suite.approved $WALKS --write before    # and, changed, --write behind
     diff -u -r before behind
-    python -m tests.bluepill_sim.peripherals.walks.approved --approve
+    python -m tests.tools.suite.approved $WALKS --approve
 """
 
 if __name__ == "__main__":

@@ -1,8 +1,4 @@
-"""What verbs of `p2os mcu` answer about two committed programs, whole: each line, figure and file.
-
-`python -m tests.bluepill_sim.cli.test_whole_answers` writes the answers anew, after a change that means them to differ;
-their difference is read as any other change is.
-"""
+"""What verbs of `p2os mcu` answer about two committed programs, whole: each line, figure and file."""
 
 import contextlib
 import hashlib
@@ -10,7 +6,6 @@ import io
 import json
 import re
 import shlex
-import tempfile
 import zipfile
 import zlib
 from pathlib import Path
@@ -32,8 +27,9 @@ from bluepill_sim.program.variables import read_variables
 from tests.bluepill_sim.board.parts.test_attaching import ATTACHED
 from tests.bluepill_sim.board.parts.test_attaching import PROGRAM as PARTS
 from tests.tools.examples import EXAMPLES
+from tests.tools.suite.golden import kept_in
 
-ANSWERS = Path(__file__).parents[2] / "golden" / "mcu"
+is_as_kept = kept_in("mcu")
 #: Name, and the words behind `p2os mcu`: a program stands for its file, and `OUT/name` for a file that is written.
 VERBS = {
     "info": "info dodge.elf --for 30ms",
@@ -149,18 +145,9 @@ OTHERS = {"monitor": monitored, "variables": variables, "first-run": first_run}
 
 @pytest.mark.parametrize("name", OTHERS)
 def test_what_is_read_out_of_programs_is_what_it_was(name: str) -> None:
-    assert OTHERS[name]() == (ANSWERS / f"{name}.txt").read_text(encoding="utf-8")
+    assert is_as_kept(OTHERS[name]().splitlines(), name)
 
 
 @pytest.mark.parametrize("name", VERBS)
 def test_a_verb_answers_as_it_did(name: str, tmp_path: Path) -> None:
-    assert answer(VERBS[name], tmp_path) == (ANSWERS / f"{name}.txt").read_text(encoding="utf-8")
-
-
-if __name__ == "__main__":
-    ANSWERS.mkdir(exist_ok=True)
-    for each, make in OTHERS.items():
-        (ANSWERS / f"{each}.txt").write_text(make(), encoding="utf-8")
-    for each, line in VERBS.items():
-        with tempfile.TemporaryDirectory() as place:
-            (ANSWERS / f"{each}.txt").write_text(answer(line, Path(place)), encoding="utf-8")
+    assert is_as_kept(answer(VERBS[name], tmp_path).splitlines(), name)

@@ -1,5 +1,7 @@
 """RTC, BKP and PWR, driven at random from reset, against traces that were approved."""
 
-from tests.bluepill_sim.peripherals.walks.approved import judge_of
+from tests.bluepill_sim.peripherals.walks.traces import traces_of
+from tests.tools.suite.approved import judge_of
 
-test_a_walk_shows_what_was_approved = judge_of("RTC", "BKP", "PWR")
+TRACES = traces_of("RTC", "BKP", "PWR")
+test_a_walk_shows_what_was_approved = judge_of(__file__, TRACES)

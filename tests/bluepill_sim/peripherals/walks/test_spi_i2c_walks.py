@@ -1,5 +1,7 @@
 """SPI and I2C, driven at random from reset, against traces that were approved."""
 
-from tests.bluepill_sim.peripherals.walks.approved import judge_of
+from tests.bluepill_sim.peripherals.walks.traces import traces_of
+from tests.tools.suite.approved import judge_of
 
-test_a_walk_shows_what_was_approved = judge_of("SPI1", "SPI2", "I2C1", "I2C2")
+TRACES = traces_of("SPI1", "SPI2", "I2C1", "I2C2")
+test_a_walk_shows_what_was_approved = judge_of(__file__, TRACES)
