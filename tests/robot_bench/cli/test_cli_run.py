@@ -283,7 +283,8 @@ def test_demo_runs_dodge_in_the_room(capsys: pytest.CaptureFixture[str]) -> None
     assert p2os(["demo", "--duration", "0.1s", "--json"]) == 0, "nothing can be missed in 0.1 s"
     outcome = json.loads(capsys.readouterr().out)
     assert outcome["goals_met"] == []
-    assert [goal.rpartition(": ")[2] for goal in outcome["goals_not_judged"]] == ["not judged before 120 s"] * 23
+    open_goals = [goal.rpartition(": ")[2] for goal in outcome["goals_not_judged"]]
+    assert open_goals == ["not judged before 120 s"] * len(load_scenario("dodge").goals)
     assert (outcome["scenario"], outcome["mode"], outcome["world"]) == ("dodge", "adapter", "room")
     assert Path("runs/demo-001/report.html").is_file()
     assert {path.name for path in Path("runs/demo-001").glob("*.png")} == {"path.png", "speeds.png", "pins.png"}

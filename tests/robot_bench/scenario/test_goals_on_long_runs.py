@@ -91,6 +91,10 @@ GOALS: Mapping[str, list[dict[str, Any]]] = {
                        {"matches": r"y=(\d+)", "least": 0}],
     "prints_lines": [{"matches": ["ready", "go .*", "left.* m"], "first": "ready"}, {"matches": ["go .*", "ready"]},
                      {"matches": [".*"], "first": "go.*"}],
+    "turn_ends": [{"low": ["DD4"], "within_s": 0.3}, {"low": ["DD4", "DD5"], "within_s": 1, "lingers_s": 0.2, "row": 2,
+                                                      "way_m": 0.3, "passage": ["DD5"], "passage_s": 0.2}],
+    "reports_motion": [{"motion": "turn", "matches": "go .*", "within_s": 0.5},
+                       {"motion": "forward", "before": ["turn"], "matches": "ready", "within_s": 2}],
     "encoder_counts_match": [{}, {"steps": 0}],
     "sensor_named": [{}],
 }  # fmt: skip
