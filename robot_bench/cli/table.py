@@ -17,9 +17,10 @@ from simbase.errors import shown
 #: What coverage counts, and its name for a person.
 _COUNTED = (("lines", "lines"), ("branch_ways", "ways of branches"))
 
-#: What stands before a goal, and the goals' place in the outcome; what failed is last.
+#: What stands before a goal, the goals' place in the outcome, and how many are listed; what failed is last.
 LABELS = (
-    ("met     ", "green", "goals_met"), ("open    ", "yellow", "goals_not_judged"), ("failed  ", "red", "failures"),
+    ("met     ", "green", "goals_met", 6), ("open    ", "yellow", "goals_not_judged", 6),
+    ("failed  ", "red", "failures", None),
 )  # fmt: skip
 
 
@@ -40,9 +41,10 @@ def print_result(result: RunResult) -> None:
         console.print(f"hit     {line}", soft_wrap=True)
     if outcome.get(EXPLAINED):
         console.print(f"why     {outcome[EXPLAINED]} (p2os explain {result.folder})", soft_wrap=True)
-    for label, colour, key in LABELS:
+    for label, colour, key, listed in LABELS:
         # What interrupted a run is no goal, and stands in the last line.
-        for goal in cast("Sequence[str]", outcome[key] or ())[key == "failures" and result.was_interrupted :]:
+        goals = cast("Sequence[str]", outcome[key] or ())[key == "failures" and result.was_interrupted :]
+        for goal in _first(goals, listed, "in the report"):
             console.print(label, style=colour, end="")
             console.print(goal, soft_wrap=True)
     verdict = verdict_of(outcome)
@@ -59,8 +61,13 @@ def _hits(outcome: Mapping[str, object]) -> list[str]:
     ]
     if any(lines[0] in failure for failure in cast("Sequence[str]", outcome["failures"]) if lines):
         return []
-    left = len(lines) - LISTED_HITS
-    return lines[:LISTED_HITS] + ([f"{left} more, in the state log"] if left > 0 else [])
+    return _first(lines, LISTED_HITS, "in the state log")
+
+
+def _first(lines: Sequence[str], listed: int | None, place: str) -> list[str]:
+    """Return the first so many (None: all), and where the others stand."""
+    left = 0 if listed is None else len(lines) - listed
+    return [*lines[:listed], *([f"{left} more, {place}"] if left > 0 else [])]
 
 
 def rows(outcome: Mapping[str, object]) -> list[tuple[str, str]]:

@@ -467,6 +467,8 @@ def _when(table: AnswersTable) -> str:
 
 
 def _bounds(table: AnswersTable) -> str:
+    if table.least is not None and table.least == table.most:
+        return f"exactly {table.least:g}"
     given = [("at least", table.least), ("at most", table.most)]
     return " and ".join(f"{word} {value:g}" for word, value in given if value is not None)
 

@@ -301,6 +301,22 @@ def test_a_run_shorter_than_its_scenario_names_what_it_left_open(capsys: pytest.
     assert "drives at least 1 m: not judged before 0.2 s" in Path("short/report.html").read_text(encoding="utf-8")
 
 
+def test_of_many_goals_that_are_met_or_open_the_first_are_listed_and_each_that_is_missed(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    open_ones = "".join(f'[[goal]]\nkind = "min_distance"\ndistance_m = {n}\n' for n in range(1, 9))
+    missed = "".join(f'[[goal]]\nkind = "usart_contains"\ntext = "never {n}"\n' for n in range(8))
+    goals = f'[[goal]]\nkind = "no_collision"\n{open_ones}'
+    assert p2os(["run", make(thumb.SLEEP, LEAST + goals), "--duration", "0.1s", "--out", "many"]) == 0
+    lines = [line for line in capsys.readouterr().out.splitlines() if line.startswith("open ")]
+    assert (len(lines), lines[-1]) == (7, "open    3 more, in the report")
+    assert p2os(["run", make(thumb.SLEEP, LEAST + missed), "--out", "missed"]) == 1
+    assert sum(line.startswith("failed  ") for line in capsys.readouterr().out.splitlines()) == 8
+    assert p2os(["run", make(thumb.SLEEP, LEAST + '[[goal]]\nkind = "no_collision"\n' * 6), "--out", "six"]) == 0
+    lines = [line for line in capsys.readouterr().out.splitlines() if line.startswith("met ")]
+    assert lines == ["met     touches nothing"] * 6
+
+
 def test_why_a_run_failed_stands_right_above_its_last_line(capsys: pytest.CaptureFixture[str]) -> None:
     goals = '[[goal]]\nkind = "min_distance"\ndistance_m = 1\n[[goal]]\nkind = "no_collision"\n'
     assert p2os(["run", make(thumb.NOWHERE, LEAST.replace("0.2", "5.0") + goals), "--out", "dead"]) == 1
