@@ -82,7 +82,7 @@ def target_of(named: str) -> ViewTarget:
         if found is not None:
             return found
     raise UsageError(
-        f"{named!r} is nothing that can be shown", hint="a run folder, a capture, a scenario, or a robot's URL"
+        f"{named!r} is nothing that can be shown", hint="a run, campaign or capture, a scenario, or a robot's URL"
     )
 
 
