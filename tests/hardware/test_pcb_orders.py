@@ -107,3 +107,10 @@ def test_what_rests_on_memory_is_asked_beside_the_order() -> None:
     assert bom_faults(dataclasses.replace(design, components=parts)) == [
         "U5: from memory, and no question to the distributor"
     ]
+
+
+@pytest.mark.parametrize("missing", [{"manufacturer": ""}, {"mpn": ""}, {"manufacturer": "", "mpn": ""}])
+def test_a_part_is_bought_by_a_manufacturer_and_a_number(missing: dict[str, str]) -> None:
+    with pytest.raises(ValueError, match="is bought but has no manufacturer or no part number"):
+        dataclasses.replace(PARTS["TVS12"], **missing)  # type: ignore[arg-type]
+    assert not dataclasses.replace(PARTS["TVS12"], bought=False, **missing).bought  # type: ignore[arg-type]
