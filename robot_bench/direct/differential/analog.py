@@ -8,7 +8,7 @@ from bisect import bisect_right
 from collections.abc import Sequence
 
 from robot_bench.direct.differential.description import BatteryDescription
-from robot_bench.direct.differential.native import BatteryStruct, functions
+from robot_bench.direct.differential.native import BatteryStruct, functions, in_struct
 from simbase.state import Stateful
 
 
@@ -27,6 +27,8 @@ class DischargingBattery(Stateful):
     """A battery that is emptied: its volts without load fall in a straight line, its resistance stays."""
 
     STATE = ("used_ah", "volts")
+    used_ah: float = in_struct("used_ah", "What is gone of its charge.")
+    volts: float = in_struct("volts", "Its volts under the present load.")
 
     def __init__(self, settings: BatteryDescription) -> None:
         self.struct = BatteryStruct(
@@ -35,24 +37,6 @@ class DischargingBattery(Stateful):
         )  # fmt: skip
         self.address = ctypes.addressof(self.struct)
         self.volts = self.source_v
-
-    @property
-    def used_ah(self) -> float:
-        """What is gone of its charge."""
-        return float(self.struct.used_ah)
-
-    @used_ah.setter
-    def used_ah(self, used_ah: float) -> None:
-        self.struct.used_ah = used_ah
-
-    @property
-    def volts(self) -> float:
-        """Its volts under the present load."""
-        return float(self.struct.volts)
-
-    @volts.setter
-    def volts(self, volts: float) -> None:
-        self.struct.volts = volts
 
     @property
     def source_v(self) -> float:

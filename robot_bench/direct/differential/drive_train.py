@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 from robot_bench.direct.differential.bridge import Shares
 from robot_bench.direct.differential.description import Differential
-from robot_bench.direct.differential.native import TrainStruct, functions
+from robot_bench.direct.differential.native import TrainStruct, functions, in_struct
 from simbase.state import Stateful
 
 
@@ -50,6 +50,8 @@ class DriveTrain(Stateful):
     """Both wheels; `dt_s` is the length of a step."""
 
     STATE = ("left_radps", "right_radps", "currents_a")
+    left_radps: float = in_struct("left_radps", "Speed of the left wheel now, rad/s.")
+    right_radps: float = in_struct("right_radps", "Speed of the right wheel now, rad/s.")
 
     def __init__(self, robot: Differential, dt_s: float) -> None:
         motor, body, gear = robot.motor, robot.body, robot.motor.gear_ratio
@@ -66,24 +68,6 @@ class DriveTrain(Stateful):
             self.own, self.other,
         )  # fmt: skip
         self.address = ctypes.addressof(self.struct)
-
-    @property
-    def left_radps(self) -> float:
-        """Speed of the left wheel now, rad/s."""
-        return float(self.struct.left_radps)
-
-    @left_radps.setter
-    def left_radps(self, radps: float) -> None:
-        self.struct.left_radps = radps
-
-    @property
-    def right_radps(self) -> float:
-        """Speed of the right wheel now, rad/s."""
-        return float(self.struct.right_radps)
-
-    @right_radps.setter
-    def right_radps(self, radps: float) -> None:
-        self.struct.right_radps = radps
 
     @property
     def currents_a(self) -> tuple[float, float]:

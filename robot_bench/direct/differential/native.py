@@ -75,6 +75,18 @@ class EncoderStruct(ctypes.Structure):
     ]
 
 
+def in_struct(name: str, doc: str) -> Any:
+    """Return a number that a part has in its `struct`, where C works on it, as an attribute of the part."""
+
+    def number(part: Any) -> float:
+        return float(getattr(part.struct, name))
+
+    def set_number(part: Any, value: float) -> None:
+        setattr(part.struct, name, value)
+
+    return property(number, set_number, doc=doc)
+
+
 @cache
 def functions() -> Any:
     """Return the functions in C.

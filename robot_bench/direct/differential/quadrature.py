@@ -10,7 +10,7 @@ import ctypes
 import math
 from array import array
 
-from robot_bench.direct.differential.native import EncoderStruct, functions
+from robot_bench.direct.differential.native import EncoderStruct, functions, in_struct
 from robot_bench.wires.nets import Net, Strength
 from simbase.state import Stateful
 from simbase.timing import Nanos
@@ -34,24 +34,16 @@ class Quadrature(Stateful):
     """
 
     STATE = ("_angle",)
+    _angle: float = in_struct("angle", "In edges since the start.")
     #: What a step has written is read at once.
     DERIVED = ("_times", "_codes")
 
     def __init__(self, a: Net, b: Net, edges_per_turn: float) -> None:
         self._nets = (a, b)
-        self._struct = EncoderStruct(edges_per_turn / (2 * math.pi), 0.0, _CODES)
-        self._address = ctypes.addressof(self._struct)
+        self.struct = EncoderStruct(edges_per_turn / (2 * math.pi), 0.0, _CODES)
+        self._address = ctypes.addressof(self.struct)
         self._turn = functions().encoder_turn
         self._make_room(_ROOM)
-
-    @property
-    def _angle(self) -> float:
-        """In edges since the start."""
-        return float(self._struct.angle)
-
-    @_angle.setter
-    def _angle(self, edges: float) -> None:
-        self._struct.angle = edges
 
     def start(self) -> None:
         """Show the wheel as it stands at time 0."""
@@ -61,11 +53,11 @@ class Quadrature(Stateful):
     def turn_to(self, angle_rad: float, begin: Nanos, span_ns: int) -> None:
         """Put the edges on the wires that lie between the last angle and this one, over a span from `begin` on."""
         edges = self._turn(self._address, angle_rad, begin, span_ns)
-        if edges > self._struct.room:
+        if edges > self.struct.room:
             self._make_room(edges)
             self._turn(self._address, angle_rad, begin, span_ns)
         if edges:
-            struct, (a, b) = self._struct, self._nets
+            struct, (a, b) = self.struct, self._nets
             if count := struct.of_a:
                 a.drive_in_turn(OWNER, self._times[:count], bytes(self._codes[:count]))
             if count := struct.of_b:
@@ -76,5 +68,5 @@ class Quadrature(Stateful):
         """Have room for so many edges of each channel in a step."""
         self._times = array("q", bytes(8 * 2 * edges))
         self._codes = array("B", bytes(2 * edges))
-        self._struct.room = edges
-        self._struct.times, self._struct.codes = self._times.buffer_info()[0], self._codes.buffer_info()[0]
+        self.struct.room = edges
+        self.struct.times, self.struct.codes = self._times.buffer_info()[0], self._codes.buffer_info()[0]
