@@ -179,11 +179,9 @@ class Pin:
         most = volts.most_v if isinstance(volts, Signal) else volts
         if most is not None and (complaint := overvoltage(self, most)) is not None:
             self._bank.warn(complaint, once=f"{self.name}:volts")
+        self.drive(level)
         if channel is not None:
             fabric.inputs_change()
-        if level is None or not self._is_held_at(level):
-            self.drive(level)
-        if channel is not None:
             put_signal(fabric, channel, volts if isinstance(volts, Signal) else constant, self._bank.now_ns)
 
     @property
@@ -342,26 +340,17 @@ class Pin:
         struct = self._struct if not self._struct.shown & self._bit else self._bank.fabric.look(self._port_index)
         return bool(getattr(struct, name) & self._bit)
 
-    def _is_held_at(self, level: bool) -> bool:
-        """Tell whether the outside drives a level hard already."""
-        struct, bit = self._struct, self._bit
-        return bool(struct.outside & bit and not struct.outside_weak & bit) and bool(struct.outside_high & bit) is level
-
-    def _set(self, **flags: bool) -> bool:
-        """Set the pin's bits in masks of its port; return whether one has changed."""
-        struct, bit, has_changed = self._struct, self._bit, False
-        for name, wanted in flags.items():
-            mask = getattr(struct, name)
-            if bool(mask & bit) is not wanted:
-                setattr(struct, name, mask ^ bit)
-                has_changed = True
-        return has_changed
-
     def _change(self, **flags: bool) -> None:
-        if self._struct.analog & self._bit:
-            self._bank.fabric.inputs_change()
-        if self._set(**flags):
-            self._bank.fabric.pins_changed(self._port_index)
+        """Set the pin's bits in masks of its port, and have known which follow; nothing where they are so already."""
+        struct, bit, fabric = self._struct, self._bit, self._bank.fabric
+        others = [name for name, wanted in flags.items() if bool(getattr(struct, name) & bit) is not wanted]
+        if not others:
+            return
+        if struct.analog & bit:
+            fabric.inputs_change()
+        for name in others:
+            setattr(struct, name, getattr(struct, name) ^ bit)
+        fabric.pins_changed(self._port_index)
 
 
 class PinBank(Stateful):

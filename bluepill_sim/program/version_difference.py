@@ -19,7 +19,7 @@ from bluepill_sim.core.thumb import Instruction, decode
 from bluepill_sim.extension.encodings import Kind, find
 from bluepill_sim.program.functions import FunctionTable
 from bluepill_sim.program.image import Image, Symbol
-from bluepill_sim.program.line_table import LineTable, read_lines
+from bluepill_sim.program.line_table import LineRow, LineTable, read_lines
 from bluepill_sim.stm32f103 import FLASH_BASE, FLASH_BYTES_FITTED, SRAM_BASE, SRAM_BYTES
 
 #: Bits of a branch that are no offset, by its size and what marks it.
@@ -209,7 +209,7 @@ def _emptied(gone: _Function, tables: tuple[LineTable, LineTable]) -> tuple[tupl
         return ()
     file = places[-1][0]  # where it ends; it may begin with what is inlined from a header
     own = sorted({line for name, line in places if name == file})
-    ours = {(row.file.rsplit("/", 1)[-1], row.line) for row in tables[0].rows}
+    ours = set(map(_place_of, tables[0].rows))
     is_there = any((file, line) in ours for line in range(own[0], own[-1] + 1))
     return tuple(sorted(set(places))) if is_there else ()
 
@@ -230,7 +230,11 @@ def _by_registers(differences: Sequence[CodeDifference], tables: tuple[LineTable
 
 def _place(table: LineTable, address: int) -> tuple[str, int] | None:
     row = table.at(address)
-    return None if row is None else (row.file.rsplit("/", 1)[-1], row.line)
+    return None if row is None else _place_of(row)
+
+
+def _place_of(row: LineRow) -> tuple[str, int]:
+    return row.file.rsplit("/", 1)[-1], row.line
 
 
 def _within(name: str, one: _Function, two: _Function) -> Iterator[CodeDifference]:
