@@ -1,18 +1,14 @@
 """The native core runs under the address and undefined-behaviour sanitizers, and with every warning an error."""
 
-import os
-import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from tests.tools.examples import EXAMPLES
+from tests.tools.suite.sanitized import built_sanitized, needs_compiler, printed_under_sanitizers
 
 SOURCES = sorted((Path(__file__).parents[3] / "bluepill_sim" / "extension" / "source").rglob("*.c"))
 UNOPTIMISED = Path(__file__).parents[1] / "firmware" / "unoptimised.elf"
-COMPILER = shutil.which("gcc")
 PROGRAM = """
 import sys
 from bluepill_sim.extension import library
@@ -39,47 +35,17 @@ for program in sys.argv[3:]:
 print(type(board.chip.engine).__name__)
 """
 
-pytestmark = pytest.mark.skipif(COMPILER is None, reason="no C compiler")
-
-
-def run(*command: str, **environment: str) -> str:
-    done = subprocess.run(
-        command, capture_output=True, text=True, timeout=120, check=False, env={**os.environ, **environment}
-    )
-    assert done.returncode == 0, done.stderr[-4000:]
-    return done.stdout
+pytestmark = needs_compiler
 
 
 @pytest.fixture(scope="module")
 def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Build the library; the interpreter's dispatch by a switch, since all other tests run the other one.
-
-    A null pointer and a place beside an object end it by the address sanitizer: to look for them twice takes 3 s.
-    """
-    library = tmp_path_factory.mktemp("built") / "core.so"
-    run(
-        "gcc", "-std=c11", "-Og", "-g1", "-Wall", "-Wextra", "-Wconversion", "-Wno-sign-conversion", "-Werror", "-fPIC",
-        "-shared", "-fsanitize=address,undefined", "-fno-sanitize=null,object-size", "-fno-sanitize-recover=all",
-        "-DINTERPRETER_PORTABLE", "-o", str(library), *map(str, SOURCES),
-    )  # fmt: skip
-    return library
+    """Build the library; the interpreter's dispatch by a switch, since all other tests run the other one."""
+    return built_sanitized(tmp_path_factory.mktemp("built") / "core.so", SOURCES, "-DINTERPRETER_PORTABLE")
 
 
 @pytest.mark.parametrize("core", ["native", "own"])
 def test_no_warning_and_no_finding(library: Path, tmp_path: Path, core: str) -> None:
-    preload = run("gcc", "-print-file-name=libasan.so").strip()
-    if not Path(preload).is_file():
-        pytest.skip("the compiler comes without a sanitizer's library")
-    printed = run(
-        sys.executable,
-        "-c",
-        PROGRAM,
-        str(library),
-        str(tmp_path / "pins.vcd"),
-        *(str(EXAMPLES / f"{name}.elf") for name in ("dodge", "motors", "encoders")),
-        str(UNOPTIMISED),
-        LD_PRELOAD=preload,
-        ASAN_OPTIONS="detect_leaks=0",
-        P2OS_CORE=core,
-    )
+    programs = (*(str(EXAMPLES / f"{name}.elf") for name in ("dodge", "motors", "encoders")), str(UNOPTIMISED))
+    printed = printed_under_sanitizers(PROGRAM, str(library), str(tmp_path / "pins.vcd"), *programs, P2OS_CORE=core)
     assert printed.split() == ["NativeEngine"]

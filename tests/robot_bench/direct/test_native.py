@@ -1,12 +1,10 @@
 """The robot's step in C runs under the address and undefined-behaviour sanitizers, and with every warning an error."""
 
-import os
-import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+
+from tests.tools.suite.sanitized import built_sanitized, needs_compiler, printed_under_sanitizers
 
 BENCH = Path(__file__).parents[3] / "robot_bench"
 SOURCES = (*sorted((BENCH / "direct" / "differential").glob("*.c")), BENCH / "wires" / "edges.c")
@@ -48,22 +46,11 @@ for kind in BridgeKind:
 print(len(a.edges_until(9 * MS)) + len(b.edges_until(9 * MS)), all(0 <= one <= 1 + 1e-9 for one in shares))
 """
 
-pytestmark = [pytest.mark.slow, pytest.mark.skipif(shutil.which("gcc") is None, reason="no C compiler")]
+pytestmark = [pytest.mark.slow, needs_compiler]
 
 
 def test_no_warning_and_no_finding(tmp_path: Path) -> None:
-    preload = subprocess.run(["gcc", "-print-file-name=libasan.so"], capture_output=True, text=True, check=True)
-    if not Path(preload.stdout.strip()).is_file():
-        pytest.skip("the compiler comes without a sanitizer's library")
-    library = str(tmp_path / "edges.so")
-    flags = ("-std=c11", "-Og", "-g1", "-ffp-contract=off", "-Wall", "-Wextra", "-Wconversion", "-Wno-sign-conversion")
-    wanted = ("-Werror", "-fPIC", "-shared", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
-    subprocess.run(["gcc", *flags, *wanted, "-o", library, *map(str, SOURCES)], check=True)
-    done = subprocess.run(
-        [sys.executable, "-c", PROGRAM, library], capture_output=True, text=True, timeout=120, check=False,
-        cwd=BENCH.parent,
-        env={**os.environ, "LD_PRELOAD": preload.stdout.strip(), "ASAN_OPTIONS": "detect_leaks=0"},
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr[-4000:]
+    library = built_sanitized(tmp_path / "edges.so", SOURCES, "-ffp-contract=off")
+    printed = printed_under_sanitizers(PROGRAM, str(library))
     # 9 rad are 5729.6 edges: 5729 on, and 5729 + 5730 back.
-    assert done.stdout.split() == ["17188", "True"]
+    assert printed.split() == ["17188", "True"]
