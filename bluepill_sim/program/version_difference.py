@@ -24,6 +24,11 @@ from bluepill_sim.stm32f103 import FLASH_BASE, FLASH_BYTES_FITTED, SRAM_BASE, SR
 
 #: Bits of a branch that are no offset, by its size and what marks it.
 _CBZ, _CONDITIONAL = (0xF500, 0xB100), (0xF000, 0xD000)
+#: What a compiler leaves out where nothing takes its result.
+_COMPUTES = frozenset({
+    Kind.PLAIN, Kind.MULTIPLY_ACCUMULATE, Kind.MULTIPLY_LONG, Kind.MULTIPLY_ACCUMULATE_LONG, Kind.DIVIDE, Kind.LOAD,
+    Kind.LOAD_LITERAL, Kind.LOAD_DUAL, Kind.IF_THEN,
+})  # fmt: skip
 #: chosen: so much of a text tells it from others.
 _TEXT_BYTES = 24
 
@@ -47,6 +52,13 @@ class LineDifference:
     #: (file, line) of each with code, in our version and in theirs.
     ours: tuple[tuple[str, int], ...]
     theirs: tuple[tuple[str, int], ...]
+    #: Whether one of their lines that has no code in ours does more than compute. One that only computes may have none
+    #: because what takes its result is another.
+    missing_acts: bool = True
+    #: Whether they are the function's first and last alone: which registers are saved follows from all between.
+    is_edge: bool = False
+    #: Whether the same instructions take other numbers, be they written there or in a macro that is used there.
+    is_number: bool = False
 
     @property
     def missing(self) -> int:
@@ -72,11 +84,15 @@ def line_differences(ours: Image, theirs: Image) -> list[LineDifference]:
         if pair[0] is None or pair[1] is None:
             continue
         one, two = (_by_line(version, table) for version, table in zip(pair, tables, strict=True) if version)
+        edges = {rows[end][0] for rows in (one, two) for end in (0, -1) if rows}
+        acting = {_place(tables[1], at) for at in pair[1].acts}
         matcher = SequenceMatcher(None, [code for _, code in one], [code for _, code in two], autojunk=False)
         for tag, i0, i1, j0, j1 in matcher.get_opcodes():
             if tag != "equal":
-                places = (tuple(place for place, _ in rows) for rows in (one[i0:i1], two[j0:j1]))
-                found.append(LineDifference(name, *places))
+                at, there = (tuple(place for place, _ in rows) for rows in (one[i0:i1], two[j0:j1]))
+                missing_acts = not acting.isdisjoint(set(there) - set(at))
+                is_number = _without_numbers(one[i0:i1]) == _without_numbers(two[j0:j1])
+                found.append(LineDifference(name, at, there, missing_acts, edges.issuperset(at + there), is_number))
     return found or _by_registers(differences, tables)
 
 
@@ -104,6 +120,8 @@ class _Function:
     plain: Sequence[str]
     #: Address of a branch within it → that of its target.
     targets: dict[int, int]
+    #: Addresses of instructions that do more than compute: stores, calls, what leaves the function or waits.
+    acts: set[int]
     end: int
 
 
@@ -121,6 +139,7 @@ class _Version:
         code = self._bytes(start, end - start)
         pool = len(code)
         addresses, tokens, plain, targets = list[int](), list[object](), list[str](), dict[int, int]()
+        acts = set[int]()
         offset = 0
         while offset + 2 <= pool:
             one = decode(code, offset, start + offset)
@@ -143,9 +162,11 @@ class _Version:
             else:
                 tokens.append(word)
                 plain.append(_without_registers(one, word))
+            if one.kind not in _COMPUTES and one.address not in targets:
+                acts.add(one.address)
             addresses.append(one.address)
             offset += one.size
-        return _Function(addresses, tokens, plain, targets, start + pool)
+        return _Function(addresses, tokens, plain, targets, acts, start + pool)
 
     def _literal(self, one: Instruction, word: int) -> int | None:
         """Return the address that an instruction loads from beside the code; None where it does not."""
@@ -200,6 +221,11 @@ def _by_line(version: _Function, table: LineTable) -> list[tuple[tuple[str, int]
         if place is not None:
             found.setdefault(place, []).append(plain)
     return sorted((place, tuple(sorted(code))) for place, code in found.items())
+
+
+def _without_numbers(rows: Sequence[tuple[tuple[str, int], tuple[str, ...]]]) -> list[list[str]]:
+    """Return what the lines came to, without the numbers of instructions that neither branch nor call."""
+    return [[plain if plain.startswith("(") else plain.partition(" ")[0] for plain in code] for _, code in rows]
 
 
 def _emptied(gone: _Function, tables: tuple[LineTable, LineTable]) -> tuple[tuple[str, int], ...]:

@@ -67,19 +67,22 @@ def by_version(trial: Trial, other: Other) -> FaultLine:
         where = ", ".join(dict.fromkeys(_lines(one) for one in found)) or "no line of code, so data, or none is known"
         says = f"it differs from {other.name} in more than one place: {where}" if found else f"it differs in {where}"
         return FaultLine(line="", says=says, also=also)
-    return FaultLine(line=place, says=f"{other.name} passes, and differs there alone", also=also)
+    by = ", by a number, which may be that of a macro" if all(one.is_number for one in found) else ""
+    return FaultLine(line=place, says=f"{other.name} passes, and differs there alone{by}", also=also)
 
 
 def place_of(found: Sequence[LineDifference]) -> str:
     """Return the one place of the differences between two versions: `a.c:12-14`; empty where it is not one.
 
-    Where lines have no code in our version, these count: what follows in other lines is the compiler's.
+    Where lines have no code in our version, these count: what follows in other lines is the compiler's. Lines that only
+    compute do not count where others of the function differ, but for its first and last: what took their result may be
+    what has changed.
     """
     most = max((one.missing for one in found), default=0)
     chosen = [one for one in found if one.missing == most] if most else [*found]
     if len({one.function for one in found if one.missing}) > 1 or len({one.function for one in chosen}) != 1:
         return ""
-    if most and len(chosen) > 1:
+    if most and (len(chosen) > 1 or (not chosen[0].missing_acts and any(_is_beside(one, chosen[0]) for one in found))):
         return ""
     lines = sorted({place for one in chosen for place in (one.theirs or one.ours)})
     if not lines or len(lines) > MOST_LINES or len({file for file, _ in lines}) != 1:
@@ -89,6 +92,10 @@ def place_of(found: Sequence[LineDifference]) -> str:
     if lines[0][0].endswith(".h"):
         return ""  # inlined, so from a line that the table does not tell
     return f"{lines[0][0]}:{ranges_text([line for _, line in lines])}"
+
+
+def _is_beside(one: LineDifference, chosen: LineDifference) -> bool:
+    return one is not chosen and one.function == chosen.function and not one.is_edge
 
 
 def _lines(one: LineDifference) -> str:

@@ -19,8 +19,8 @@ def good() -> Image:
     return load_image(DODGE)
 
 
-def built(folder: Path, right: str, wrong: str, file: str = SOURCE) -> Image:
-    """Return `dodge` with a piece of text of a source changed."""
+def built(folder: Path, right: str, wrong: str, file: str = SOURCE, program: str = "dodge") -> Image:
+    """Return a program with a piece of text of a source changed."""
     if shutil.which(COMPILER) is None:
         pytest.skip(f"no {COMPILER}")
     sources = folder / "sources"
@@ -31,7 +31,7 @@ def built(folder: Path, right: str, wrong: str, file: str = SOURCE) -> Image:
     path.write_text(text.replace(right, wrong))
     output = folder / "changed.elf"
     build_elf(
-        PROGRAMS["dodge"], folder=sources, linker_script="f103c8.ld", output=output, more_flags=("-w", "-Wno-error")
+        PROGRAMS[program], folder=sources, linker_script="f103c8.ld", output=output, more_flags=("-w", "-Wno-error")
     )
     return load_image(output)
 
@@ -96,6 +96,40 @@ def test_a_line_that_takes_another_variable_is_known_where_it_is_the_only_one(
     assert code_differences(bad, good)
     lines = [place for one in line_differences(bad, good) for place in one.theirs]
     assert lines == ([(SOURCE, line_of(named))] if named else [])
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "is_number"),
+    [
+        ("if (way - dodge->turn_way >= SOON_WAY) {", "if (way - dodge->turn_way >= SOON_WAY + 5) {", True),
+        ("if (way - dodge->turn_way >= SOON_WAY) {", "if (way - dodge->turn_way == SOON_WAY - 1) {", False),  # a branch
+        ("begin_turn(dodge, twist, LONG_TWIST);", "begin_turn(dodge, -twist, LONG_TWIST);", False),
+    ],
+)
+def test_a_line_that_takes_another_number_alone_is_known(
+    right: str, wrong: str, is_number: bool, good: Image, tmp_path: Path
+) -> None:
+    found = line_differences(built(tmp_path, right, wrong), good)
+    assert {one.is_number for one in found} == {is_number}
+
+
+def test_of_lines_without_code_it_is_known_whether_they_only_compute(good: Image, tmp_path: Path) -> None:
+    # Nothing takes `is_forward` any more, so the compiler leaves out the line before the one that was changed.
+    rover = load_image(HERE / "rover.elf")
+    found = line_differences(
+        built(tmp_path, "is_forward && is_blocked()", "is_blocked()", "rover.c", "rover"), rover
+    )  # fmt: skip
+    unused, use = line_of("bool is_forward =", "rover.c"), line_of("is_forward && is_blocked()", "rover.c")
+    first = next(one for one in found if ("rover.c", unused) in one.theirs)
+    assert (first.missing, first.missing_acts, first.is_edge) == (1, False, False)
+    assert any(("rover.c", use) in one.theirs and not one.is_edge for one in found)
+    assert found[-1].is_edge
+    assert [line for _, line in found[-1].theirs] == [line_of("} while (!has_arrived());", "rover.c") + 1]
+    (tmp_path / "call").mkdir()
+    *_, gone = line_differences(
+        built(tmp_path / "call", "    note_ground(dodge, way);\n    return", "    return"), good
+    )  # fmt: skip
+    assert (gone.missing, gone.missing_acts) == (1, True)
 
 
 def test_a_branch_that_leads_elsewhere_is_a_difference(good: Image) -> None:

@@ -62,8 +62,14 @@ def test_only_a_version_that_passes_tells_of_one_that_fails(good: Trial, wrong: 
         by_version(trial, Other("bad.elf", trial.files["dodge.elf"]))
 
 
-def lines(function: str, ours: list[int], theirs: list[int], file: str = "a.c") -> LineDifference:
-    return LineDifference(function, tuple((file, one) for one in ours), tuple((file, one) for one in theirs))
+def lines(function: str, ours: list[int], theirs: list[int], file: str = "a.c", **known: bool) -> LineDifference:
+    at, there = (tuple((file, one) for one in side) for side in (ours, theirs))
+    return LineDifference(function, at, there, **known)
+
+
+def computed(*theirs: int) -> LineDifference:
+    """Return lines of `f` that only compute and have no code in our version."""
+    return lines("f", [], [*theirs], missing_acts=False)
 
 
 @pytest.mark.parametrize(
@@ -79,6 +85,11 @@ def lines(function: str, ours: list[int], theirs: list[int], file: str = "a.c") 
         ([lines("f", [], [3]), lines("f", [], [9])], ""),
         ([lines("f", [], [*range(1, MOST_LINES + 1)])], "a.c:1-4"),
         ([lines("f", [], [*range(1, MOST_LINES + 2)])], ""),
+        ([computed(3)], "a.c:3"),
+        ([computed(3), lines("f", [5], [5])], ""),  # what took its result may have changed
+        ([computed(3), lines("f", [9], [9], is_edge=True)], "a.c:3"),
+        ([computed(3), lines("g", [9], [9])], "a.c:3"),
+        ([lines("f", [], [3]), lines("f", [5], [5])], "a.c:3"),
         ([lines("f", [3], [3], "a.h")], ""),
         ([lines("f", [12], [])], "a.c:12"),
         ([], ""),
