@@ -113,7 +113,7 @@ def _line_of_campaign(folder: Path, other: Other | None, minutes: float) -> Faul
     """Return the source line that makes a point of a campaign fail, or that it is not known."""
     failing, passing = failing_and_passing(points_of(folder, trust=False))
     if other is not None:
-        return by_version(failing[0], other)
+        return by_version(failing, other)
     until = wall_clock() + round(minutes * 60 * NS_PER_S)
     with RunDisplay(is_shown=False) as display:
         workers = Processes(1, RunLimits(), display.raise_if_interrupted)
@@ -135,7 +135,7 @@ def _with_line(found: Explanation, run: Path, firmware: Path | None, reference: 
     if found.standing is Standing.NOTHING or not run.is_dir():
         return found
     try:
-        line = by_version(trial_of_run(run, firmware, trust=False), Other.read(reference))
+        line = by_version([trial_of_run(run, firmware, trust=False)], Other.read(reference))
     except (P2osError, BluePillError) as error:
         return replace(found, limits=(*found.limits, f"the line by which {reference.name} differs: {error}"))
     if not line.line:

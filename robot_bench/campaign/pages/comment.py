@@ -96,7 +96,7 @@ def _against(row: PointRow, other: Other) -> tuple[str, str]:
     trial = row.cheap.trial if row.finding is PointFinding.CONFIRMED else (row.failing or row.cheap).trial
     difference = first_apart(trial, other)
     try:
-        cause = by_version(trial, other)
+        cause = by_version([trial], other)
     except P2osError as error:
         return "none" if difference is None else reported(difference), f"unknown: {error}"
     said = f"`{cause.line}`, {cause.says}" if cause.line else f"unknown: {cause.says}"

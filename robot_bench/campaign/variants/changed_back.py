@@ -123,7 +123,9 @@ class ChangedBack:
         failing, passing = len(self.failing), len(self.passing)
         if failing >= LEAST_FAILING and failing + passing >= LEAST:
             return ""
-        return f"{failing} points fail and {passing} pass, too few to judge a change by"
+        fail = "1 point fails" if failing == 1 else f"{failing} points fail"
+        few = f"{fail} and {passing} pass, too few to judge a change by"
+        return f"{few}: {LEAST_FAILING} that fail, {LEAST} in all are needed, so run more points"
 
     @property
     def result(self) -> FaultLine:

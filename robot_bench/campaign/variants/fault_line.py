@@ -45,18 +45,21 @@ class FaultLine:
         return "\n".join(line for row in rows for line in wrap(row, WIDTH, subsequent_indent="  "))
 
 
-def by_version(trial: Trial, other: Other) -> FaultLine:
-    """Return the lines by which a program that fails a trial differs from one that passes it.
+def by_version(trials: Sequence[Trial], other: Other) -> FaultLine:
+    """Return the lines by which a program that fails some trials differs from one that passes the first that it can.
 
     Raises:
-        UsageError: The trial does not fail, or fails with the other version too.
+        UsageError: A trial does not fail, or the other version passes none.
         ImageError: A program cannot be read.
     """
-    failing, good = run_trial(trial), trial.with_firmware(other.content)
-    passing = run_trial(good)
-    if failing.verdict is not TrialVerdict.FAILED:
-        raise UsageError(f"{trial.firmware_name} does not fail here", hint="explain a run that fails")
-    if passing.verdict is not TrialVerdict.PASSED:
+    for trial in trials:
+        failing, good = run_trial(trial), trial.with_firmware(other.content)
+        if failing.verdict is not TrialVerdict.FAILED:
+            raise UsageError(f"{trial.firmware_name} does not fail here", hint="explain a run that fails")
+        passing = run_trial(good)
+        if passing.verdict is TrialVerdict.PASSED:
+            break
+    else:
         why = next(iter(passing.failures), "it has no verdict")
         raise UsageError(f"{other.name} does not pass either: {why}", hint="--against a version that is good")
     parted = first_apart(trial, other)

@@ -309,7 +309,7 @@ def _facts(done: Whole, other: Other | None) -> Iterator[str]:
     points, different = len(done.progress.rows), done.different_runs
     if different < points:
         several = "s" * (different > 1)
-        yield f"note    {points} points were {different} different run{several}: what varies acts in no more"
+        yield f"note    {points} points made {different} different run{several}: in the others nothing varied that acts"
 
 
 def print_errors(done: Whole) -> None:

@@ -288,7 +288,7 @@ def test_points_that_were_one_run_are_said_to_be(tmp_path: Path) -> None:
         return Outcome(verdict=TrialVerdict.PASSED, sha256="1")
 
     whole = carried(begun(tmp_path), tmp_path / "kept", Shuffled(1, judge=alike))
-    assert "note    12 points were 1 different run: what varies acts in no more" in [*_facts(whole, None)]
+    assert "note    12 points made 1 different run: in the others nothing varied that acts" in [*_facts(whole, None)]
     assert whole.as_json()["different_runs"] == 1
 
 

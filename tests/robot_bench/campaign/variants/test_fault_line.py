@@ -46,7 +46,8 @@ def wrong(good: Trial) -> tuple[Trial, str]:
 @pytest.mark.slow
 def test_the_line_by_which_a_version_that_passes_differs(good: Trial, wrong: tuple[Trial, str]) -> None:
     trial, line = wrong
-    found = by_version(trial, Other("good.elf", good.files["dodge.elf"]))
+    hopeless = trial.with_lists(goal=[GOAL, {"kind": "min_distance", "distance_m": 100.0}])  # for the good one too
+    found = by_version([hopeless, trial], Other("good.elf", good.files["dodge.elf"]))
     assert (found.line, found.says) == (line, "good.elf passes, and differs there alone")
     assert found.also[0].startswith("answers: the motors had")
     assert found.also[1].startswith("they part at ")
@@ -57,9 +58,9 @@ def test_the_line_by_which_a_version_that_passes_differs(good: Trial, wrong: tup
 def test_only_a_version_that_passes_tells_of_one_that_fails(good: Trial, wrong: tuple[Trial, str]) -> None:
     trial, _ = wrong
     with pytest.raises(UsageError, match="does not fail here"):
-        by_version(good, Other("good.elf", good.files["dodge.elf"]))
+        by_version([good], Other("good.elf", good.files["dodge.elf"]))
     with pytest.raises(UsageError, match=r"bad\.elf does not pass either: answers"):
-        by_version(trial, Other("bad.elf", trial.files["dodge.elf"]))
+        by_version([trial, trial], Other("bad.elf", trial.files["dodge.elf"]))
 
 
 def lines(function: str, ours: list[int], theirs: list[int], file: str = "a.c", **known: bool) -> LineDifference:

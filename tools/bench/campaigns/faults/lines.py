@@ -51,7 +51,7 @@ def by_failure(name: str, folder: Path, good: Path) -> dict[str, str] | None:
     if not left:
         return None
     try:
-        return asdict(by_version(trial_of(str(left[0])), Other.read(good)))
+        return asdict(by_version([trial_of(str(left[0]))], Other.read(good)))
     except UsageError as error:
         return {"line": "", "says": str(error)}
 
