@@ -234,11 +234,12 @@ ${stuck}way_m = 0.5
 within_s = 180.0
 ends_run = "missed"
 
-[[goal]]                # turns go to the free side; one alone may go the other way
+[[goal]]                # turns go to the free side; one alone may go the other way, as every seventh of dodge does
 kind = "turns_away"
 ${blind}near_m = 0.55
 free_m = 0.8
 row = 1
+within_turns = 5
 ends_run = "missed"
 
 [[goal]]                # and so do arcs

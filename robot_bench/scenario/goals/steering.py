@@ -90,18 +90,23 @@ class TurnsAwayTable(SidesTable):
     """Sides, and how many turns in a row may go the wrong way."""
 
     row: Annotated[int, Key(least=0, most=1000, doc="so many in a row may not")] = 0
+    within_turns: Annotated[
+        int, Key(least=0, most=1000, doc="one is in a row with another at most so many turns before it; 0: with any")
+    ] = 0
     apart_m: Annotated[float, Key(least=0, most=100, doc="what begins nearer to the last turn belongs to it")] = 0.5
 
 
 class TurnsAway(Watch):
     """Turns on the spot go away from what stands on one side only; so many in a row may go towards it."""
 
-    STATE = ("_ranges", "_last", "_side", "_turned_m", "_begun", "_ended", "_row", "_worst", "_worst_at")
+    STATE = (
+        "_ranges", "_last", "_side", "_turned_m", "_begun", "_ended", "_turns", "_wrong", "_row", "_worst", "_worst_at",
+    )  # fmt: skip
     kinds = (Ranges, Pose)
 
     def __init__(self, table: TurnsAwayTable) -> None:
         self._sides = _Sides(table)
-        self._most, self._apart_m = table.row, table.apart_m
+        self._most, self._apart_m, self._within = table.row, table.apart_m, table.within_turns or math.inf
         self._ranges: Ranges | None = None
         self._last: Pose | None = None
         #: Of the turn that goes on: the side that was nearer as it began, how far the rims parted, its first pose.
@@ -109,6 +114,8 @@ class TurnsAway(Watch):
         self._begun: Pose | None = None
         #: Where the last turn ended.
         self._ended: Pose | None = None
+        #: How many turns have begun, and the number of the last that went to the wrong side.
+        self._turns = self._wrong = 0
         self._row = self._worst = 0
         self._worst_at: Pose | None = None
 
@@ -127,6 +134,7 @@ class TurnsAway(Watch):
     def _turn(self, pose: Pose, took_s: float) -> GoalOutcome | None:
         if self._begun is None:
             self._begun, self._turned_m = pose, 0.0
+            self._turns += 1
             ended = self._ended
             is_another = ended is None or math.hypot(pose.x - ended.x, pose.y - ended.y) >= self._apart_m * MICRO
             self._side = self._sides.nearer(self._ranges) if is_another else 0
@@ -134,7 +142,11 @@ class TurnsAway(Watch):
         before, self._turned_m = abs(self._turned_m), self._turned_m + _difference_mps(pose) * took_s
         if not self._side or not before < TURN_M <= abs(self._turned_m):
             return None
-        self._row = self._row + 1 if self._turned_m * self._side > 0 else 0
+        if self._turned_m * self._side > 0:
+            self._row = self._row + 1 if self._turns - self._wrong <= self._within else 1
+            self._wrong = self._turns
+        else:
+            self._row = 0
         if self._row > self._worst:
             self._worst, self._worst_at = self._row, self._begun
         return self.finish(pose.t) if self._row == self._most + 1 == self._worst else None
@@ -329,7 +341,8 @@ class BacksOnPath(Watch):
 KINDS: Mapping[str, GoalKind] = {
     "turns_away": GoalKind(
         TurnsAwayTable,
-        lambda table: f"turns on the spot away from what stands on one side, but for {table.row} in a row",
+        lambda table: f"turns on the spot away from what stands on one side, but for {table.row} in a row"
+        + (f" within {table.within_turns} turns" if table.within_turns else ""),
         TurnsAway, doc="a turn on the spot that begins with something nearer than `near_m` on one side and the other "
         "free beyond `free_m` goes to the free one",
     ),

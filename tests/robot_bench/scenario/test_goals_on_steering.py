@@ -71,6 +71,17 @@ def test_goal_turns_away_counts_those_in_a_row() -> None:
     assert turns_away(run, row=1).robustness == -0.5
 
 
+@pytest.mark.parametrize(("between", "met"), [(0, False), (2, False), (3, True)])
+def test_goal_turns_away_counts_no_row_of_turns_that_are_far_apart(between: int, met: bool) -> None:
+    run: list[Event] = [at(0), seen(S, NEAR), *turn(2 * S, left=True), seen(3 * S, BETWEEN)]
+    for number in range(between):  # not judged: nothing is near
+        run += turn((4 + number) * S, 1.0 + number, left=True)
+    run += [seen(9 * S, NEAR), *turn(10 * S, 9.0, left=True)]
+    assert turns_away(run, row=1, within_turns=3).met is met
+    assert not turns_away(run, row=1).met
+    assert not turns_away([*run, *turn(11 * S, 10.0, left=True)], row=1, within_turns=3).met  # a new row
+
+
 def turned(t: int, degrees: float, x_m: float = 0.0) -> list[Event]:
     """Return a turn on the spot by so much, then a pose that stands."""
     ends = [at(t + n * 100 * MS, x_m, deg=degrees * n / 10, left=-0.12, right=0.12) for n in range(11)]
