@@ -31,6 +31,7 @@ from p2os.transport.wall_clock import GAP_NS, GapWatch, wall_clock
 from simbase.errors import P2osError
 from simbase.listening import WebClientError
 from simbase.timing import NS_PER_MS, NS_PER_S
+from tests.tools.suite.acted import Acted, taken
 from tests.tools.suite.approved import Trace, judge_of, said, tried
 
 pytestmark = pytest.mark.skipif(
@@ -60,39 +61,12 @@ def did(action: Callable[..., object], *arguments: object, **named: object) -> s
         return f"{type(error).__name__} {error}"
 
 
-class Acted:
-    """Something of the system whose every call is noted, and answered from a list where there is one for it."""
-
-    def __init__(self, calls: list[str], **answers: Sequence[object]) -> None:
-        self._calls, self._answers = calls, {name: [*given] for name, given in answers.items()}
-
-    def __getattr__(self, name: str) -> Callable[..., Any]:
-        if name.startswith("__"):
-            raise AttributeError(name)
-
-        def call(*arguments: object, **named: object) -> Any:
-            shown = [f"{len(each)} bytes" if isinstance(each, bytes) and len(each) > 20 else each for each in arguments]
-            self._calls.append(f"{name}{said(shown)}{said(named) if named else ''}")
-            given = self._answers.get(name)
-            answer = given.pop(0) if given else None
-            if isinstance(answer, BaseException):
-                raise answer
-            return answer(*arguments) if callable(answer) else answer
-
-        return call
-
-
 class ActedSocket(Acted):
     """A connection; what it is sent it takes, unless told otherwise."""
 
     def __init__(self, calls: list[str], *, family: object = socket.AF_INET, **answers: Sequence[object]) -> None:
-        super().__init__(calls, **{"send": [len] * 999, **answers})
+        super().__init__(calls, "", **{"send": [len] * 999, **answers})
         self.family = family
-
-
-def taken(calls: list[str]) -> str:
-    found, calls[:] = said(calls), []
-    return found
 
 
 def urls(draw: random.Random) -> Iterator[str]:
