@@ -1,17 +1,22 @@
 """Programs that call anything of a robot, in one thread by steps; peers that answer oddly; the parts of a client."""
 
+import asyncio
 import math
 import random
+import selectors
+import socket
 import threading
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import closing
+from collections.abc import Awaitable, Callable, Iterable, Iterator
+from contextlib import closing, suppress
 from dataclasses import fields
+from inspect import isawaitable
 from logging import Handler, LogRecord, getLogger
 from typing import Any
 from unittest.mock import patch
+from weakref import finalize
 
 from p2os import Robot
-from p2os.client import link, notices, robot
+from p2os.client import aio, link, notices, robot
 from p2os.client.aux_ports import AuxBuffer
 from p2os.client.core import RobotCore
 from p2os.client.line import Line
@@ -32,9 +37,10 @@ from p2os.protocol.sip import SonarReading, StandardSip
 from p2os.robots.parameters import load_parameters
 from p2os.transport.ports import HungUpError
 from p2os.transport.waiting import wait_readable
+from simbase.errors import P2osError
 from simbase.timing import NS_PER_MS, NS_PER_S
 from tests.p2os.client.client_rig import free_pioneer
-from tests.tools.suite.approved import Trace, judge_of, said, tried
+from tests.tools.suite.approved import Trace, judge_of, refusal, said, tried
 
 MS = NS_PER_MS
 NAME = Identity(name="Rob", robot_class="Pioneer", subclass="p2dx")
@@ -48,9 +54,12 @@ class Wire:
     def __init__(self, place: "Place") -> None:
         self._place, self.is_open = place, True
         place.opened += 1
+        place.wires += 1
 
     def read(self) -> bytes:
         place = self._place
+        with suppress(BlockingIOError):
+            place.bells[0].recv(4096)
         place.pioneer.advance_to(place.now)
         data = b"".join(place.pioneer.take_output())
         if place.fails:
@@ -65,11 +74,12 @@ class Wire:
         if not place.is_cut:
             place.pioneer.receive(data, place.now)
             place.has_answer = True
+            place.ring()
 
     def fileno(self) -> int:
         if self._place.is_blind:
             raise TransportError("no descriptor")
-        return int(self._place.runner._wake_up.fileno())
+        return self._place.bells[0].fileno()
 
     def set_baud(self, baud: int) -> None:
         self._place.sent.append(f"baud {baud}")
@@ -77,6 +87,7 @@ class Wire:
     def close(self) -> None:
         if self.is_open:
             self.is_open = False
+            self._place.wires -= 1
             self._place.sent.append(f"{self._place.now // MS} closed")
             self._place.pioneer.hang_up(self._place.now)
 
@@ -85,15 +96,32 @@ class Place:
     """A robot, and the clock by whose waits the client's thread takes its turns within the program's."""
 
     def __init__(self, pioneer: Pioneer) -> None:
-        self.pioneer, self.now, self.opened = pioneer, 5 * NS_PER_S, 0
+        self.pioneer, self.now, self.opened, self.wires = pioneer, 5 * NS_PER_S, 0, 0
         self.fails = self.is_cut = self.is_away = self.has_answer = False
         #: Whether its line has no descriptor, and is asked again and again.
         self.is_blind = True
         self.sent: list[str] = []
         self.runner: Any = None
+        #: The first is readable where the line of a robot may be.
+        self.bells = socket.socketpair()
+        for bell in self.bells:
+            bell.setblocking(False)
+            finalize(self, bell.close)
 
     def __call__(self) -> int:
         return self.now
+
+    def due(self) -> int | None:
+        """Return when the robot says something that is heard."""
+        if self.wires:
+            return None if self.is_cut else self.pioneer.next_deadline()
+        self.pioneer.advance_to(self.now)
+        self.pioneer.take_output()
+        return None
+
+    def ring(self) -> None:
+        with suppress(BlockingIOError):
+            self.bells[1].send(b"x")
 
     def open(self, _url: str) -> Wire:
         if self.is_away:
@@ -103,9 +131,8 @@ class Place:
     def wait_readable(self, _descriptors: Iterable[int], longest_s: float) -> set[int]:
         has_answer, self.has_answer = self.has_answer, False
         if not (has_answer or wait_readable([self.runner._wake_up.fileno()], 0)):
-            due = self.pioneer.next_deadline()
-            ends = self.now + math.ceil(longest_s * NS_PER_S)
-            self.now = max(self.now, ends if due is None or self.is_cut else min(ends, due))
+            due, ends = self.due(), self.now + math.ceil(longest_s * NS_PER_S)
+            self.now = max(self.now, ends if due is None else min(ends, due))
         return set()
 
     def wait_for_change(self, _changed: threading.Condition, longest_s: float) -> None:
@@ -183,8 +210,8 @@ def whats(draw: random.Random, it: Robot, place: Place) -> list[Callable[[], obj
         aux.flush_input,
         lambda: aux.readinto(memoryview(bytearray(2))), lambda: (aux.readable(), aux.writable(), aux.timeout_s),
         lambda: (it.link, it.baud, it.stats, it.limits, it.profile, it.parameters.subclass, it.config is None),
-        lambda: (it.identity, it.pose, it.state.number), lambda: setattr(place, "is_cut", not place.is_cut),
-        lambda: setattr(place, "fails", not place.fails), lambda: setattr(place, "is_away", draw.random() < 0.5),
+        lambda: (it.identity, it.pose, it.state.number), lambda: setattr(place, "is_cut", draw.random() < 0.5),
+        lambda: setattr(place, "fails", draw.random() < 0.5), lambda: setattr(place, "is_away", draw.random() < 0.5),
         lambda: place.pioneer.do(draw.choice(("fault wheel-blocked left", "clear wheel-blocked", "fault stop-button",
                                               "clear stop-button", "fault reboot")), place.now),
         lambda: setattr(place, "now", place.now + draw.choice((300, 900, 3000)) * MS), lambda: it.connect() is it,
@@ -222,8 +249,9 @@ def program(draw: random.Random, place: Place, acts: int, **options: Any) -> Ite
                     if number == acts * 2 // 3:
                         for end in ends:
                             end()
-                    if number % 9 == 8:
+                    if number % 6 == 5:
                         place.fails = place.is_cut = place.is_away = False
+                        yield tried(lambda: it.connect() is it)
                     what = draw.choice(whats(draw, it, place))
                     yield tried(what)
                     place.live(draw.choice((0, 10, 30, 250)) * MS)
@@ -254,6 +282,140 @@ def bare(draw: random.Random) -> Iterator[str]:
     place = Place(free_pioneer("p2at8", profile=Profile.AROS))
     place.is_blind = False
     yield from program(draw, place, 90, settings=chosen, model=load_parameters("p2at8"))
+
+
+class StepSelector(selectors.DefaultSelector):
+    """Waits for an event loop's descriptors by the clock of a place."""
+
+    def __init__(self, place: Place) -> None:
+        super().__init__()
+        self._place = place
+
+    def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
+        ready, place = super().select(0), self._place
+        if ready or timeout is None or timeout <= 0:
+            return ready
+        due, ends = place.due(), place.now + math.ceil(timeout * NS_PER_S)
+        if due is not None and due < ends:
+            place.ring()
+            ends = due
+        place.now = max(place.now, ends)
+        return super().select(0)
+
+
+class StepLoop(asyncio.SelectorEventLoop):
+    """An event loop by the clock of a place; executors work at once."""
+
+    def __init__(self, place: Place) -> None:
+        self._place = place
+        super().__init__(StepSelector(place))
+
+    def time(self) -> float:
+        return self._place.now / NS_PER_S
+
+    def run_in_executor(self, _executor: object, func: Callable[..., Any], *args: Any) -> asyncio.Future[Any]:  # type: ignore[override]  # as typeshed has it
+        future: asyncio.Future[Any] = self.create_future()
+        try:
+            future.set_result(func(*args))
+        except Exception as error:  # noqa: BLE001 - whatever it is
+            future.set_exception(error)
+        return future
+
+
+def awaits(draw: random.Random, it: aio.Robot, place: Place) -> list[Callable[[], Awaitable[object] | None]]:
+    """Return what a program of asyncio may do with a robot."""
+    aux, kind = it.aux(draw.choice((1, 2))), draw.choice((IoPacket, EncoderPacket, GripperPacket))
+
+    async def some_states() -> list[int]:
+        return [state.number async for state in it.states(0.35)]
+
+    async def some_events() -> list[str]:
+        it.request_io()
+        found: list[str] = []
+        with suppress(TimeoutError):
+            async with asyncio.timeout(0.6):
+                async for notice in it.events():
+                    found.append(words_of(notice))  # noqa: PERF401 - what came before the end counts
+        return found
+
+    async def given_up() -> str:
+        task = asyncio.ensure_future(it.drive(1.0))
+        await asyncio.sleep(0.3)
+        task.cancel()
+        with suppress(asyncio.CancelledError):
+            await task
+        return "given up"
+
+    async def number() -> int:
+        return (await it.next_state(draw.choice((0.05, 2.0)))).number
+
+    return [
+        lambda: it.drive(draw.choice((0.2, -0.1)), speed_mps=draw.choice((None, 0.2)), timeout_s=draw.choice((None,
+        0.4))),
+        lambda: it.turn(draw.choice((0.5, -1.0))), lambda: it.turn_to(draw.choice((3.0, -3.0)), timeout_s=9.0), number,
+        lambda: it.sleep(draw.choice((0.0, 0.3, 2.5))), lambda: it.fetch(kind, 0.5),
+        lambda: it.wait_open(draw.choice((0.1, 3.0))),
+        some_states, some_events, given_up, lambda: aux.write(b"abc"), lambda: aux.read(draw.choice((0, 3, -1))),
+        aux.flush_input,
+        lambda: place.pioneer.receive_aux(1, b"from aux", place.now), lambda: it.set_velocity(0.2, draw.choice((0.0,
+        0.5))),
+        it.stop, lambda: setattr(place, "is_cut", draw.random() < 0.5), lambda: setattr(place, "fails",
+        draw.random() < 0.5),
+        lambda: setattr(place, "is_away", draw.random() < 0.5), lambda: setattr(place, "now", place.now + 900 * MS),
+        aux.close,
+    ]  # fmt: skip
+
+
+def awaited(draw: random.Random) -> Iterator[str]:
+    """Yield what a robot of asyncio answers and is sent, whatever a program awaits."""
+    place, heard, found = Place(free_pioneer()), list[str](), list[str]()
+    place.is_blind = False
+
+    async def program() -> None:
+        it = aio.Robot("tcp:robot", opener=place.open, clock=place)
+        it.on_event(lambda notice: heard.append(words_of(notice)))
+        async with it:
+            found.append(said((it.link, it.state.number)) + place.taken())
+            for number in range(110):
+                if number % 6 == 5:
+                    place.fails = place.is_cut = place.is_away = False
+                    await it.connect()
+                what = draw.choice(awaits(draw, it, place))
+                try:
+                    answer: object = what()
+                    answer = await answer if isawaitable(answer) else answer
+                    found.append(said(answer))
+                except (P2osError, ValueError) as error:
+                    found.append(refusal(error))
+                await asyncio.sleep(draw.choice((0.0, 0.02, 0.2)))
+                found.append(said((place.now // MS, place.opened, heard, it.link)) + place.taken())
+                heard.clear()
+        found.append(said((it.link, it._runner._is_finished)) + place.taken())
+        await it.close()
+        it._runner.finish()
+
+    with (
+        patch.object(aio, "exit_on_signals", lambda: None),
+        asyncio.Runner(loop_factory=lambda: StepLoop(place)) as runner,
+    ):
+        runner.run(program())
+    yield from found
+    place = Place(free_pioneer())
+    place.is_away = True
+
+    async def refused() -> str:
+        it = aio.Robot("tcp:robot", opener=place.open, clock=place)
+        try:
+            await it.connect()
+        except P2osError as error:
+            return refusal(error) + tried(it.set_velocity, 0.1)
+        return ""
+
+    with (
+        patch.object(aio, "exit_on_signals", lambda: None),
+        asyncio.Runner(loop_factory=lambda: StepLoop(place)) as runner,
+    ):
+        yield runner.run(refused()) + place.taken()
 
 
 def peers(draw: random.Random) -> Iterator[str]:  # noqa: C901, PLR0912 - a table of answers
@@ -504,6 +666,6 @@ def lines(draw: random.Random) -> Iterator[str]:
 
 
 TRACES: dict[str, Trace] = {
-    each.__name__: each for each in (usual, careful, bare, peers, parts, aux_bytes, observed, lines)
+    each.__name__: each for each in (usual, careful, bare, awaited, peers, parts, aux_bytes, observed, lines)
 }
 test_what_was_approved_is_shown = judge_of(__file__, TRACES)
