@@ -274,7 +274,12 @@ def usual(draw: random.Random) -> Iterator[str]:
 
 def careful(draw: random.Random) -> Iterator[str]:
     place = Place(free_pioneer("p3dx-sh", profile=Profile.ARCOS))
+    place.is_blind = False
     yield from program(draw, place, 70, auto_enable=False, reconnect=False, deadman_s=None, model="p3dx-sh")
+
+
+def blind(draw: random.Random) -> Iterator[str]:
+    yield from program(draw, Place(free_pioneer()), 9)
 
 
 def bare(draw: random.Random) -> Iterator[str]:
@@ -666,6 +671,6 @@ def lines(draw: random.Random) -> Iterator[str]:
 
 
 TRACES: dict[str, Trace] = {
-    each.__name__: each for each in (usual, careful, bare, awaited, peers, parts, aux_bytes, observed, lines)
+    each.__name__: each for each in (usual, careful, blind, bare, awaited, peers, parts, aux_bytes, observed, lines)
 }
 test_what_was_approved_is_shown = judge_of(__file__, TRACES)
