@@ -33,8 +33,8 @@ def one_act(draw: random.Random, rig: Rig, goals: list[MotionGoal]) -> None:  # 
             axis = DriveAxis(draw.choice((0.4, -0.2, 0.0, 0.01)))
             goals.append(core.begin_goal(axis, draw.choice((None, 500 * MS)), draw.choice((None, 0.1)), now))
         case 6 | 7:
-            axis = TurnAxis(math.radians(draw.choice((30, -90, 0, 200))))
-            goals.append(core.begin_goal(axis, None, draw.choice((None, 0.4)), now))
+            turn = TurnAxis(math.radians(draw.choice((30, -90, 0, 200))))
+            goals.append(core.begin_goal(turn, None, draw.choice((None, 0.4)), now))
         case 8:
             core.stop(now, at_once=draw.random() < 0.5)
         case 9:
