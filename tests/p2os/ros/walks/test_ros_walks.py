@@ -26,6 +26,7 @@ from p2os.protocol.packets import SimLaserPacket
 from p2os.protocol.sip import SonarReading, StandardSip
 from p2os.robots.parameters import load_parameters
 from p2os.ros import bags, codec, dds, message_table, transports, zenoh_node
+from p2os.ros.frames import Frames
 from p2os.ros.robot_messages import Scans, health, planar, seen_as
 from p2os.ros.robot_node import COMMANDS, RobotNode
 from p2os.ros.thesis_topics import encoder_code, motor_speed, near
@@ -163,6 +164,7 @@ def values(draw: random.Random) -> Iterator[str]:
     ):
         packet = SimLaserPacket(total=total, first=first, ranges_mm=(50, 100, 7999, 8000, 12, 13)[:count])
         yield shown(scans.take(packet, 5_000_000_000 + first))
+    yield said(Frames(load_parameters("p2dx")).name("x")) + said(Frames(load_parameters("p2dx")).has_laser)
     yield shown(health(None, "gone", is_open=False, counts={"a": 1}))
     for model in ("p2dx", "p3at-sh", "amigo"):
         frames = RobotNode(load_parameters(model), OPTIONS[1], deadman_ns=1, laser=LASER).frames

@@ -46,7 +46,7 @@ from p2os.view.frames import (
 from p2os.view.header import ChannelHeader, PageHeader, PageSection, PageText, PanelState
 from p2os.view.live import LiveRecording, StillRecording
 from p2os.view.packet_rows import PacketTexts
-from p2os.view.recording import ChannelTrack, ViewRecording
+from p2os.view.recording import ChannelTrack, ViewRecording, _extend_plain
 from p2os.view.run_control import COMMANDS, CommandError, RunCommand, RunState, command_of
 from p2os.view.served_robots import ServedRobots
 from p2os.view.server import app, page_session, serving
@@ -65,7 +65,7 @@ def short(data: bytes) -> str:
     return data.hex() if len(data) < 200 else f"{len(data)} bytes {zlib.crc32(data):08x}"
 
 
-def told(message: object) -> str:
+def shown_as(message: object) -> str:
     """Return what a page is sent as text, a frame by its cells."""
     if isinstance(message, str):
         return message
@@ -122,14 +122,14 @@ def frames(draw: random.Random) -> Iterator[str]:
             grown(draw, track, rows)
             data = track.frame(-5, 60, 100, flags=draw.choice([*FrameFlags, FrameFlags(0)])).to_bytes()
             yield data.hex()
-            yield told(data)
+            yield shown_as(data)
         for _ in range(24):
             place = draw.choice((*range(48), *range(48, len(data))))
             changed = bytearray(data)
             changed[place] = draw.choice((0, 1, 255, data[place] ^ 1))
-            yield f"{place} {tried(lambda: told(bytes(changed)))}"
+            yield f"{place} {tried(lambda: shown_as(bytes(changed)))}"
         for cut in (0, 47, 48, len(data) - 8, len(data) - 1):
-            yield tried(lambda cut=cut: told(data[:cut]))
+            yield tried(lambda cut=cut: shown_as(data[:cut]))
         both = data + data
         yield tried(lambda: len([*frames_in(both)]))
         yield said(
@@ -232,6 +232,11 @@ def tracks(draw: random.Random) -> Iterator[str]:
         yield said([framed(one)[:300] for one in recording.frames(20, 30)])
     levels = ChannelTrack(ChannelHeader(name="x", kind="levels"))
     levels.extend_levels([1, 2, 9], [0, 1, 0])
+    yield said([tried(levels.append, 9, *cells) for cells in ((), (1,), (1, 1), (1, 1, 1))])
+    plain = array("d")
+    for values in ([math.nan, 2.0, math.nan], [3.0, 4.0], [math.nan, 5.0], [math.nan], [math.inf, -math.inf]):
+        _extend_plain(plain, array("d", values))
+        yield said([*plain])
     yield framed(levels.tail(0, 3))
 
 
@@ -322,8 +327,8 @@ def sessions(draw: random.Random) -> Iterator[str]:  # noqa: C901, PLR0912 - a t
                     control.panel = replace(control.panel, at_ns=number)
                 session = draw.choice(sessions)
                 text = drawn_request(draw, len(recording.tracks))
-                yield f"{text[:120]} {refused(lambda: [*map(told, session.receive(text, now_s))])}"
-                yield said([*map(told, session.news())])
+                yield f"{text[:120]} {refused(lambda: [*map(shown_as, session.receive(text, now_s))])}"
+                yield said([*map(shown_as, session.news())])
                 yield said(control and (control.calls, session._is_driving, session._lost))
                 if control is not None:
                     control.calls.clear()
@@ -331,9 +336,12 @@ def sessions(draw: random.Random) -> Iterator[str]:  # noqa: C901, PLR0912 - a t
             session.close()
         yield said(control and control.calls)
         flood = PageSession(live)
-        yield said([refused(lambda: [*map(told, flood.receive('{"want":[]}', 5.0))]) for _ in range(102)])
+        yield said([refused(lambda: [*map(shown_as, flood.receive('{"want":[]}', 5.0))]) for _ in range(102)])
         yield said(
-            [refused(lambda at=at: [*map(told, flood.receive('{"want":[]}', at))]) for at in (5.02, 5.03, 5.05, 7.0)]
+            [
+                refused(lambda at=at: [*map(shown_as, flood.receive('{"want":[]}', at))])
+                for at in (5.02, 5.03, 5.05, 7.0)
+            ]
         )
 
 
@@ -396,7 +404,7 @@ def pages(draw: random.Random) -> Iterator[str]:  # noqa: C901, PLR0915 - one co
         async def send(message: Any) -> None:
             shown = {key: value for key, value in message.items() if key != "bytes"}
             if message.get("bytes"):
-                shown["frame"] = told(message["bytes"])
+                shown["frame"] = shown_as(message["bytes"])
             sent.append(
                 said({key: short(value) if isinstance(value, bytes) else value for key, value in shown.items()})
             )
@@ -551,6 +559,7 @@ def drawn_chunks(draw: random.Random) -> Iterator[Chunk]:
         if draw.random() < 0.1:
             data = data[:-1] + bytes((data[-1] ^ 1,)) + b"\0\1"
         yield Chunk(at_ns=now, direction=Direction.TO_ROBOT if to_robot else Direction.FROM_ROBOT, data=data)
+    yield Chunk(at_ns=now + 1, direction=Direction.TO_ROBOT, data=Command(C.VEL, 300).to_frame().to_bytes()[:-2])
 
 
 def watched(draw: random.Random) -> Iterator[str]:

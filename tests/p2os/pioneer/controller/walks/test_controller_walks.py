@@ -4,6 +4,9 @@ import math
 import random
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from p2os.pioneer.body.contract import free_wheels
@@ -12,7 +15,7 @@ from p2os.pioneer.controller import ControllerSettings, Pioneer
 from p2os.pioneer.controller.bumper_watch import _middle, _touched
 from p2os.pioneer.controller.dead_reckoning import DeadReckoning, raw_angle
 from p2os.pioneer.controller.faults import FAULTS, Faults, read_fault
-from p2os.pioneer.controller.flash import DEFAULTS, RANGES, FlashParameters
+from p2os.pioneer.controller.flash import DEFAULTS, RANGES, FlashParameters, load_flash
 from p2os.pioneer.controller.live_inputs import INPUTS
 from p2os.pioneer.controller.settings import LONGEST_SIP_PERIOD_MS, SonarPerSip
 from p2os.pioneer.devices.laser import LaserModel
@@ -147,6 +150,34 @@ def crowded(draw: random.Random) -> Iterator[str]:
         yield from life(draw, model, chosen, 40, 5, world)
 
 
+def _note(events: list[str], now: int, what: str, detail: str) -> None:
+    events.append(f"{now} {what} {detail}")
+
+
+def kinds(draw: random.Random) -> Iterator[str]:
+    """Yield what becomes of each command with each kind of argument, whether it is its own or not."""
+    for model, profile in (("p2dx", Profile.P2OS), ("p3at-sh", Profile.ARCOS)):
+        events: list[str] = []
+        parameters, body = load_parameters(model), make_body("kinematic", load_world("room"), load_parameters(model))
+        chosen = ControllerSettings(profile=profile, laser=LASER, lenient=model == "p2dx")
+        pioneer = Pioneer(
+            parameters=parameters, body=body, settings=chosen,
+            on_event=partial(_note, events),
+        )  # fmt: skip
+        now = 0
+        for number in sorted({*BY_NUMBER} - {*ENDS}):
+            for argument in (None, 5, -1, b"", b"ab", b"\1\3\x80"):
+                if not pioneer.state.open:
+                    for each in (0, 1, 2, C.OPEN):
+                        pioneer.receive(Command(each).to_frame().to_bytes(), now)
+                pioneer.receive(Command(number, argument).to_frame().to_bytes(), now)
+                now += draw.choice((0, 5, 30)) * NS_PER_MS
+                pioneer.advance_to(now)
+                sent = b"".join(frame for frame in pioneer.take_output())
+                yield said((number, argument, events, sent.hex(), pioneer.state, pioneer.stats))
+                events.clear()
+
+
 def tables(draw: random.Random) -> Iterator[str]:  # noqa: C901, PLR0912 - a table after the other
     """Yield FLASH, settings, faults and inputs at the ends of what each may be."""
     p2dx = load_parameters("p2dx")
@@ -156,6 +187,13 @@ def tables(draw: random.Random) -> Iterator[str]:  # noqa: C901, PLR0912 - a tab
             yield tried(lambda name=name, value=value: FlashParameters().with_values({name: value}).values)
     for text in ("Wilma", "a" * 300, "é", ""):
         yield tried(lambda text=text: FlashParameters().with_values({"name": text, "serial": text}).text("name"))
+    with TemporaryDirectory() as folder:
+        path = Path(folder, "f.toml")
+        for text in ("[flash]", '[flash]\nname = "W"\nsipcycle = 50', "[flash]\n[other]", "[other]", "x = 1",
+                     "flash = 1", "[flash]\nnme = 1", "[flash]\n\nsipcycle = 0", "[[flash]]", "[flash"):  # fmt: skip
+            path.write_text(text)
+            yield tried(load_flash, path).replace(folder, "")
+        yield tried(load_flash, Path(folder, "none")).replace(folder, "")
     for model in ("p2dx", "p3at-sh", "amigo", "powerbot"):
         parameters = load_parameters(model)
         flash = FlashParameters().with_values({"sipcycle": 50, "watchdog": 900, "name": "W", "hostbaud": 2})
@@ -222,6 +260,6 @@ def tables(draw: random.Random) -> Iterator[str]:  # noqa: C901, PLR0912 - a tab
         yield said((vars(reckoning), reckoning.heading_rad, reckoning.zero_rad, reckoning.raw_position(485_000)))
 
 
-TRACES: dict[str, Trace] = {each.__name__: each for each in (plain, erring, simulated, crowded, tables)}
+TRACES: dict[str, Trace] = {each.__name__: each for each in (plain, erring, simulated, crowded, kinds, tables)}
 TRACES["figures"] = figures_of("p2os.pioneer.controller")
 test_what_was_approved_is_shown = judge_of(__file__, TRACES)

@@ -39,7 +39,8 @@ from tests.tools.suite.approved import Trace, figures_of, judge_of, rounded, sai
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are Unix's")
 
 ORDERS = (
-    "status", "status", "1: status", "2: status", " 2 :reset", "reset", "reset now", "help", "1:help", "clear all",
+    "status", "status", "1: status", "2: status", " 2 :reset", "reset", "reset now", "help", "help me", "1:help",
+    "clear all",
     "dance", "", "0: status",
     "4: status", "x: status", "2:", "fault sonar-stuck 3 1.2", "1: fault bumper front 2", "fault wheel-blocked left",
     "clear sonar-stuck 3", "clear bumper", "fault low-battery 10.5", "fault reboot", "fault", "joystick 512 1023 1",
