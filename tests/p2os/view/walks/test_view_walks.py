@@ -130,6 +130,9 @@ def frames(draw: random.Random) -> Iterator[str]:
             yield f"{place} {tried(lambda: shown_as(bytes(changed)))}"
         for cut in (0, 47, 48, len(data) - 8, len(data) - 1):
             yield tried(lambda cut=cut: shown_as(data[:cut]))
+        longer = bytearray(data + bytes(8))
+        longer[24:28] = len(longer).to_bytes(4, "little")
+        yield tried(lambda: shown_as(bytes(longer)))
         both = data + data
         yield tried(lambda: len([*frames_in(both)]))
         yield said(
@@ -496,6 +499,8 @@ def servers(draw: random.Random) -> Iterator[str]:
                 server.close()
                 yield said((server._server.should_exit, server._thread.daemon, server._thread.name)) + taken(calls)
     with patch.object(socket, "getaddrinfo", Acted(calls, "", ask=[socket.gaierror(-2, "Name not known")]).ask):
+        yield tried(serving.ViewServer, source, "no.where", 1)
+    with patch.object(socket, "getaddrinfo", Acted(calls, "", ask=[OSError("odd")]).ask):
         yield tried(serving.ViewServer, source, "no.where", 1)
 
 

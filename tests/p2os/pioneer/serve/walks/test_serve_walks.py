@@ -34,6 +34,7 @@ from p2os.protocol.commands import CommandNumber as C
 from p2os.protocol.profiles import Profile
 from p2os.transport import HungUpError, Listener, Loops, Transport, listen_url
 from simbase.timing import NS_PER_MS, NS_PER_S
+from tests.tools.suite.acted import Acted, taken
 from tests.tools.suite.approved import Trace, figures_of, judge_of, rounded, said, tried
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are Unix's")
@@ -315,7 +316,7 @@ class Polled:
         self.lines = []
 
 
-def operators(draw: random.Random) -> Iterator[str]:
+def operators(draw: random.Random) -> Iterator[str]:  # noqa: PLR0915 - one operator after the other
     written: list[str] = []
     place = Place(FleetOrder(robots=robots(2), body="kinematic", apart=True))
     listener = place.loops.listen("operator")
@@ -340,6 +341,16 @@ def operators(draw: random.Random) -> Iterator[str]:
     yield said((control.poll_s, control.descriptors()))
     control.close()
     yield said(polled.lines)
+    calls: list[str] = []
+    gone = Acted(
+        calls,
+        "operator",
+        read=[b"status\n", TransportError("gone")],
+        write=[TransportError("gone")],
+        close=[TransportError("x")],
+    )
+    polled.lines = [gone]
+    yield said((control.serve(place.hosts), control.poll_s)) + taken(calls)
     typed: list[Any] = [b"status\n2: st", b"atus\n", OSError(5, "Input/output error"), b""]
 
     def read(descriptor: int, most: int) -> bytes:
