@@ -150,6 +150,30 @@ def crowded(draw: random.Random) -> Iterator[str]:
         yield from life(draw, model, chosen, 40, 5, world)
 
 
+def bumped(draw: random.Random) -> Iterator[str]:
+    """Yield what a pressed bumper does to each way, by each policy; and a test of the battery that a fault ends."""
+    parameters = load_parameters("p3at-sh")
+    for policy in range(4):
+        for side in ("front", "rear"):
+            for speed in (200, 0, -200):
+                body = make_body("kinematic", load_world("room"), parameters)
+                pioneer = Pioneer(parameters=parameters, body=body, settings=ControllerSettings())
+                opens = ((0, None), (1, None), (2, None), (C.OPEN, None), (C.ENABLE, 1))
+                for number, value in (*opens, (C.BUMPSTALL, policy), (C.VEL, speed)):
+                    pioneer.receive(Command(number, value).to_frame().to_bytes(), 0)
+                pioneer.advance_to(250 * NS_PER_MS)
+                pioneer.do(f"fault bumper {side} 3", 250 * NS_PER_MS)
+                for now_ms in (260, 271, 300, 480):
+                    pioneer.advance_to(now_ms * NS_PER_MS)
+                    yield said((policy, side, speed, now_ms, pioneer.state, pioneer.next_deadline()))
+                yield b"".join(pioneer.take_output())[-40:].hex()
+    for number, value in ((C.BATTEST, 110), (C.PULSE, None)):
+        for words in ("fault low-battery 10.5", "clear low-battery", "fault low-battery 11"):
+            pioneer.receive(Command(number, value).to_frame().to_bytes(), 480 * NS_PER_MS)
+            yield said((pioneer.state.injected, tried(pioneer.do, words, 480 * NS_PER_MS), pioneer.state.injected))
+            yield said(pioneer.state.battery_v)
+
+
 def _note(events: list[str], now: int, what: str, detail: str) -> None:
     events.append(f"{now} {what} {detail}")
 
@@ -260,6 +284,6 @@ def tables(draw: random.Random) -> Iterator[str]:  # noqa: C901, PLR0912 - a tab
         yield said((vars(reckoning), reckoning.heading_rad, reckoning.zero_rad, reckoning.raw_position(485_000)))
 
 
-TRACES: dict[str, Trace] = {each.__name__: each for each in (plain, erring, simulated, crowded, kinds, tables)}
+TRACES: dict[str, Trace] = {each.__name__: each for each in (plain, erring, simulated, crowded, bumped, kinds, tables)}
 TRACES["figures"] = figures_of("p2os.pioneer.controller")
 test_what_was_approved_is_shown = judge_of(__file__, TRACES)
