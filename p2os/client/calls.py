@@ -37,6 +37,8 @@ from simbase.timing import NS_PER_S, Nanos
 ONCE, ALWAYS = 1, 2
 #: SAY carries at most so many notes, each at most so long (Pioneer manuals, command 15).
 MOST_NOTES, LONGEST_NOTE_S, NOTE_UNIT_S = 20, 5.1, 0.02
+#: POLLING carries a byte a sonar, counted from 1 (Pioneer manuals, command 3).
+MOST_SONAR = 0xFE
 
 
 class Runner(Protocol):
@@ -263,8 +265,15 @@ class RobotCalls:
         self.send(sonar(on))
 
     def set_sonar_order(self, numbers: Iterable[int]) -> None:
-        """Let sonar fire in this order, numbered from 0; repeats are allowed, an empty order is silence (POLLING)."""
-        self.send(CommandNumber.POLLING, bytes(number + 1 for number in numbers))
+        """Let sonar fire in this order, numbered from 0; repeats are allowed, an empty order is silence (POLLING).
+
+        Raises:
+            UsageError: A number does not fit a byte, in which the wire counts from 1.
+        """
+        order = list(numbers)
+        if wrong := [number for number in order if not 0 <= number <= MOST_SONAR]:
+            raise UsageError(f"sonar {wrong[0]}: they are numbered from 0 to {MOST_SONAR}")
+        self.send(CommandNumber.POLLING, bytes(number + 1 for number in order))
 
     # Inputs and outputs -------------------------------------------------------------------
 

@@ -20,8 +20,8 @@ MOST_DOMAIN = 232
 LOOPBACK = "127.0.0.1"
 #: How many messages wait for a slow subscriber: ROS' own default.
 DEPTH = 10
-_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*$")
-_NAMESPACE = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+$")
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+_NAMESPACE = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,9 +66,9 @@ class NodeOptions:
     is_router: bool = False
 
     def __post_init__(self) -> None:
-        if not _NAME.match(self.name):
+        if not _NAME.fullmatch(self.name):
             raise UsageError(f"{shown(self.name)} is no name of a node", hint="letters, digits and _")
-        if self.namespace and not _NAMESPACE.match(self.namespace):
+        if self.namespace and not _NAMESPACE.fullmatch(self.namespace):
             raise UsageError(f"{shown(self.namespace)} is no namespace", hint="such as /robot1")
         if not 0 <= self.domain <= MOST_DOMAIN:
             raise UsageError(f"there is no domain {self.domain}", hint=f"0 to {MOST_DOMAIN}")

@@ -52,7 +52,8 @@ def open_hosts(
                     paced=not robot.port.startswith("serial:"), sync_limit_ns=robot.sync_limit_ns,
                 )
             )  # fmt: skip
-            hosts[-1].aux = tuple(AuxEndpoint(port, listen_url(url)) for port, url in robot.aux)
+            for port, url in robot.aux:  # one by one: each is given back if the next cannot be had
+                hosts[-1].aux += (AuxEndpoint(port, listen_url(url)),)
     except BaseException:
         for host in hosts:
             host.close()

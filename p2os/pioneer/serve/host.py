@@ -331,7 +331,7 @@ class Host:
         except TransportError as error:
             self._drop_client(str(error))
             return False
-        if data and self._lines is not None:
+        if self._lines is not None:
             self._lines[0].put(data, self.now)
         elif data:
             self._bring(self.now)

@@ -17,6 +17,7 @@ from collections.abc import Sequence
 from p2os.errors import WorldError
 from p2os.pioneer.controller.faults import FAULTS
 from p2os.pioneer.controller.live_inputs import INPUTS
+from p2os.pioneer.controller.order_words import read_words
 from p2os.pioneer.serve.host import Host
 from p2os.pioneer.serve.multi_robot_world import MultiRobotWorld
 from p2os.pioneer.serve.world_orders import WORLD_ORDERS, is_world_order
@@ -24,6 +25,8 @@ from simbase.errors import UsageError, nearest
 
 #: A longer line is cut.
 LONGEST_LINE = 200
+#: Orders of one word.
+ALONE = ("status", "reset")
 #: What a line can begin with, after the robot's number.
 FIRST_WORDS = ("status", "fault", "clear", "reset", "place", "move", "remove", *INPUTS, "help")
 
@@ -46,7 +49,7 @@ def carry_out(hosts: Sequence[Host], text: str) -> list[str]:
     numbers, words = _addressed(text.strip(), len(hosts))
     if words.split()[:1] == ["help"]:
         return help_lines()
-    _check_first_word(words)
+    _check_words(words)
     if words == "reset":
         return _start_over([(number, hosts[number - 1]) for number in numbers])
     if is_world_order(words):
@@ -87,10 +90,12 @@ def _speed(speed_mps: float) -> str:
     return f"{round(speed_mps, 3) + 0.0:.3f}"
 
 
-def _check_first_word(words: str) -> None:
-    first = words.split(maxsplit=1)[0] if words else ""
+def _check_words(words: str) -> None:
+    first, *rest = words.split() or [""]
     if first not in FIRST_WORDS:
         raise UsageError(f"no order {first!r}", hint=nearest(first, FIRST_WORDS, f"orders: {', '.join(FIRST_WORDS)}"))
+    if first in ALONE:
+        read_words(words, first, rest, (), {})
 
 
 def _addressed(text: str, robots: int) -> tuple[range, str]:

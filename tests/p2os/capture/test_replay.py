@@ -1,6 +1,9 @@
 """Recorded conversations played again, in virtual time; and what a tap sends at the end."""
 
+import zlib
+from collections.abc import Iterator
 from pathlib import Path
+from random import Random
 
 import pytest
 
@@ -10,6 +13,7 @@ from p2os.capture.tap import Tap
 from p2os.protocol.commands import Command, CommandNumber
 from p2os.protocol.connection import Connection, ConnectionRole, ConnectionState, SipReceived
 from simbase.timing import NS_PER_MS, NS_PER_S
+from tests.tools.suite.golden import kept_in
 
 GOLDEN = Path(__file__).resolve().parents[2] / "golden" / "captures"
 TO, FROM = Direction.TO_ROBOT, Direction.FROM_ROBOT
@@ -109,3 +113,31 @@ def test_a_tap_sees_a_change_of_speed(code: int, baud: int | None) -> None:
     tap = Tap()
     tap.observe(TO, command(CommandNumber.HOSTBAUD, code), 0)
     assert tap.new_baud == baud
+
+
+def replayed(name: str, role: Direction, speed: float) -> Iterator[str]:
+    """Yield what goes out of one side of a recording, while the other side says its own, late and now and then not."""
+    capture, draw = read_file(GOLDEN / f"{name}.jsonl"), Random(f"{name} {role} {speed}")
+    replay, now = Replay(capture, role, speed=speed), 3 * NS_PER_S
+    heard = [piece.data for piece in frame_chunks(capture.chunks) if piece.direction is not role]
+    yield f"{name} {role.name} {speed}: {replay.frames_left} frames"
+    replay.start(now)
+    for number in range(70):
+        if heard and number > 2 and draw.random() < 0.6:
+            replay.receive(heard.pop(0), now)
+        due, awaited, waited = replay.next_deadline(), replay.awaited, replay.waited(now)
+        replay.advance_to(now)
+        sent = replay.take_output()
+        shown = f"{len(sent)} {zlib.crc32(b''.join(sent)):08x}"
+        yield f"{now} {due} {awaited!r} {waited} {shown} {replay.frames_left} {replay.is_closed}"
+        if not replay.frames_left:
+            return
+        later = draw.choice((0, 1, 100 * NS_PER_MS))
+        now = max(now, due + draw.choice((-1, 0, 1))) if due is not None and draw.random() < 0.7 else now + later
+
+
+def test_what_is_played_of_recordings_is_what_was_read_and_kept() -> None:
+    names = ("player_p2de", "soar_p3dx", "ros_p2dx")
+    several = [(name, role, speed) for name in names for role in (TO, FROM) for speed in (1.0, 0.5, 3.0)]
+    lines = [line for each in several for line in replayed(*each)]
+    assert kept_in("formats")(lines, "replays")

@@ -10,8 +10,11 @@ keeps the checksums. A change that is meant changes traces too: write them befor
 """
 
 import argparse
+import ast
 import importlib
+import inspect
 import json
+import pkgutil
 import random
 import re
 import sys
@@ -70,6 +73,34 @@ def refusal(error: Exception) -> str:
             words = words.replace(part, "…") if part else words
     hint = getattr(error, "hint", None)
     return f"{words} ({hint})" if hint else words
+
+
+def figures_of(package: str) -> Trace:
+    """Return the trace of a package's figures: each number and text that a module of it names, whoever uses it."""
+
+    def figures(_draw: random.Random) -> Iterable[str]:
+        root = importlib.import_module(package)
+        for found in sorted(pkgutil.iter_modules(root.__path__), key=lambda one: one.name):
+            module = importlib.import_module(f"{package}.{found.name}")
+            for name in _assigned(inspect.getsource(module)):
+                if _is_figure(value := getattr(module, name, None)):
+                    yield f"{found.name} {name} {said(value)}"
+
+    return figures
+
+
+def _assigned(source: str) -> list[str]:
+    """Return the names in capitals that a module itself gives values to."""
+    rows = [row for row in ast.parse(source).body if isinstance(row, ast.Assign | ast.AnnAssign)]
+    targets = [target for row in rows for target in (row.targets if isinstance(row, ast.Assign) else [row.target])]
+    names = [one.id for target in targets for one in ast.walk(target) if isinstance(one, ast.Name)]
+    return [name for name in names if name.isupper()]
+
+
+def _is_figure(value: object) -> bool:
+    if isinstance(value, tuple):
+        return all(map(_is_figure, value))
+    return isinstance(value, int | float | str | bytes)
 
 
 def judge_of(file: str, traces: Mapping[str, Trace]) -> Callable[..., None]:

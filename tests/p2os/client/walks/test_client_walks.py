@@ -16,21 +16,25 @@ from tests.p2os.client.client_rig import MS, Rig, free_pioneer, new_pioneer
 from tests.tools.suite.approved import Trace, judge_of, refusal, said
 
 USUAL = ClientSettings()
+COMMANDS = (
+    C.SETV, C.SETA, C.SONAR, C.BUMPSTALL, C.VEL2, C.ROTATE, C.SETO, C.CONFIG, C.ENABLE, C.MOVE, C.HEAD, C.DHEAD, C.VEL,
+    C.RVEL, C.STOP, C.E_STOP, C.PTUPOS,
+)  # fmt: skip
 WORDS = ("stop-button", "wheel-blocked left", "bumper front 2", "line-noise 0.002", "low-battery 10.9")
 
 
 def one_act(draw: random.Random, rig: Rig, goals: list[MotionGoal]) -> None:  # noqa: C901, PLR0912 - a table of acts
     """Do one thing that a program, its user or the world may do."""
     core, now = rig.core, rig.now
-    match draw.randrange(22):
+    match draw.randrange(24):
         case 0 | 1 | 2 | 3:
             core.set_velocity(draw.choice((0.0, 0.1, 0.3, -0.2, 9.0)), draw.choice((0.0, 0.0, 0.5, -1.0, 9.0)), now)
         case 4 | 5:
             axis = DriveAxis(draw.choice((0.4, -0.2, 0.0, 0.01)))
             goals.append(core.begin_goal(axis, draw.choice((None, 500 * MS)), draw.choice((None, 0.1)), now))
         case 6 | 7:
-            axis = TurnAxis(math.radians(draw.choice((30, -90, 0, 200))))
-            goals.append(core.begin_goal(axis, None, draw.choice((None, 0.4)), now))
+            turn = TurnAxis(math.radians(draw.choice((30, -90, 0, 200))))
+            goals.append(core.begin_goal(turn, None, draw.choice((None, 0.4)), now))
         case 8:
             core.stop(now, at_once=draw.random() < 0.5)
         case 9:
@@ -39,9 +43,9 @@ def one_act(draw: random.Random, rig: Rig, goals: list[MotionGoal]) -> None:  # 
             core.cancel_goal(goals[-1], now)
         case 11:
             core.set_pose(RobotPose(x_m=1.0, y_m=-2.0, heading_rad=draw.uniform(-3, 3)))
-        case 12:
-            number = draw.choice((C.SETV, C.SETA, C.SONAR, C.BUMPSTALL, C.VEL2, C.ROTATE, C.SETO, C.CONFIG, C.ENABLE))
-            core.send(Command(number, draw.choice((0, 1, 100, 300))), now)
+        case 12 | 20 | 21:
+            number = draw.choice(COMMANDS)
+            core.send(Command(number, draw.choice((0, 1, 100, 300, -80))), now)
         case 13:
             core.take_gap(draw.choice((100, 900, 2500)) * MS, now)
         case 14:
@@ -89,10 +93,12 @@ def walk_of(
 
 
 TRACES: dict[str, Trace] = {
-    "over TCP": walk_of(free_pioneer, 90),
-    "among walls": walk_of(lambda: new_pioneer(crowded=True), 40, ClientSettings(deadman_ns=None)),
-    "at a port": walk_of(lambda: free_pioneer("p3dx-sh", profile=Profile.ARCOS), 60, baud=9600),
+    "over TCP": walk_of(free_pioneer, 160),
+    "among walls": walk_of(lambda: new_pioneer(crowded=True), 90, ClientSettings(deadman_ns=None)),
+    "at a port": walk_of(lambda: free_pioneer("p3dx-sh", profile=Profile.ARCOS), 100, baud=9600),
     "on a bad line": walk_of(free_pioneer, 60, ClientSettings(auto_enable=False, plausibility_ns=400 * MS), "garbling"),
-    "late": walk_of(lambda: free_pioneer("p2at8", profile=Profile.AROS), 40, ClientSettings(reconnect=False), "late"),
+    "late": walk_of(lambda: free_pioneer("p2at8", profile=Profile.AROS), 60, ClientSettings(reconnect=False), "late"),
+    "in pieces": walk_of(lambda: free_pioneer("p3at-sh", profile=Profile.ARCOS), 60, wire="byte by byte"),
+    "with losses": walk_of(free_pioneer, 60, ClientSettings(deadman_ns=None, plausibility_ns=200 * MS), "lossy", 9600),
 }
 test_what_was_approved_is_shown = judge_of(__file__, TRACES)

@@ -1,15 +1,25 @@
 """Clients and operators that do anything to a robot of each firmware: bytes, events and state, as approved."""
 
+import math
 import random
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
 
+from p2os.pioneer.body.contract import free_wheels
 from p2os.pioneer.body.factory import make_body
 from p2os.pioneer.controller import ControllerSettings, Pioneer
-from p2os.pioneer.controller.faults import FAULTS
+from p2os.pioneer.controller.bumper_watch import _middle, _touched
+from p2os.pioneer.controller.dead_reckoning import DeadReckoning, raw_angle
+from p2os.pioneer.controller.faults import FAULTS, Faults, read_fault
+from p2os.pioneer.controller.flash import DEFAULTS, RANGES, FlashParameters, load_flash
 from p2os.pioneer.controller.live_inputs import INPUTS
-from p2os.pioneer.controller.settings import SonarPerSip
+from p2os.pioneer.controller.settings import LONGEST_SIP_PERIOD_MS, SonarPerSip
 from p2os.pioneer.devices.laser import LaserModel
+from p2os.pioneer.random_source import RandomSource
 from p2os.pioneer.sensor_errors import REALISTIC
 from p2os.pioneer.world.loader import load_world
 from p2os.protocol.command_table import BY_NUMBER, Argument
@@ -18,7 +28,7 @@ from p2os.protocol.commands import CommandNumber as C
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import load_parameters
 from simbase.timing import NS_PER_MS
-from tests.tools.suite.approved import Trace, judge_of, said, tried
+from tests.tools.suite.approved import Trace, figures_of, judge_of, said, tried
 
 LASER = LaserModel(start_deg=-20, end_deg=20, step_cdeg=200, range_m=8.0)
 #: What moves the robot, and is said more often than the rest.
@@ -72,11 +82,11 @@ def drawn_words(draw: random.Random) -> str:
 
 
 def life(  # noqa: C901 - a table of acts
-    draw: random.Random, model: str, settings: ControllerSettings, steps: int, each: int
+    draw: random.Random, model: str, settings: ControllerSettings, steps: int, each: int, world: str = "room"
 ) -> Iterator[str]:
     """Yield what a robot shows of a client that says what it likes, and of an operator."""
     parameters, events = load_parameters(model), list[str]()
-    body = make_body("kinematic", load_world("room"), parameters)
+    body = make_body("kinematic", load_world(world, seed=3), parameters)
     pioneer = Pioneer(
         parameters=parameters, body=body, settings=settings,
         on_event=lambda now, what, detail: events.append(f"{now} {what} {detail}"),
@@ -133,5 +143,147 @@ def simulated(draw: random.Random) -> Iterator[str]:
         yield from life(draw, model, chosen, 32, 11)
 
 
-TRACES: dict[str, Trace] = {each.__name__: each for each in (plain, erring, simulated)}
+def crowded(draw: random.Random) -> Iterator[str]:
+    """Yield lives among things that are run into, of robots with bumpers and stalls."""
+    for model, world in (("p3at-sh", "maze"), ("powerbot", "office"), ("amigo", "arena")):
+        chosen = ControllerSettings(seed=5, sonar_per_sip=SonarPerSip.ALL)
+        yield from life(draw, model, chosen, 40, 5, world)
+
+
+def bumped(draw: random.Random) -> Iterator[str]:
+    """Yield what a pressed bumper does to each way, by each policy; and a test of the battery that a fault ends."""
+    parameters = load_parameters("p3at-sh")
+    for policy in range(4):
+        for side in ("front", "rear"):
+            for speed in (200, 0, -200):
+                body = make_body("kinematic", load_world("room"), parameters)
+                pioneer = Pioneer(parameters=parameters, body=body, settings=ControllerSettings())
+                opens = ((0, None), (1, None), (2, None), (C.OPEN, None), (C.ENABLE, 1))
+                for number, value in (*opens, (C.BUMPSTALL, policy), (C.VEL, speed)):
+                    pioneer.receive(Command(number, value).to_frame().to_bytes(), 0)
+                pioneer.advance_to(250 * NS_PER_MS)
+                pioneer.do(f"fault bumper {side} 3", 250 * NS_PER_MS)
+                for now_ms in (260, 271, 300, 480):
+                    pioneer.advance_to(now_ms * NS_PER_MS)
+                    yield said((policy, side, speed, now_ms, pioneer.state, pioneer.next_deadline()))
+                yield b"".join(pioneer.take_output())[-40:].hex()
+    for number, value in ((C.BATTEST, 110), (C.PULSE, None)):
+        for words in ("fault low-battery 10.5", "clear low-battery", "fault low-battery 11"):
+            pioneer.receive(Command(number, value).to_frame().to_bytes(), 480 * NS_PER_MS)
+            yield said((pioneer.state.injected, tried(pioneer.do, words, 480 * NS_PER_MS), pioneer.state.injected))
+            yield said(pioneer.state.battery_v)
+
+
+def _note(events: list[str], now: int, what: str, detail: str) -> None:
+    events.append(f"{now} {what} {detail}")
+
+
+def kinds(draw: random.Random) -> Iterator[str]:
+    """Yield what becomes of each command with each kind of argument, whether it is its own or not."""
+    for model, profile in (("p2dx", Profile.P2OS), ("p3at-sh", Profile.ARCOS)):
+        events: list[str] = []
+        parameters, body = load_parameters(model), make_body("kinematic", load_world("room"), load_parameters(model))
+        chosen = ControllerSettings(profile=profile, laser=LASER, lenient=model == "p2dx")
+        pioneer = Pioneer(
+            parameters=parameters, body=body, settings=chosen,
+            on_event=partial(_note, events),
+        )  # fmt: skip
+        now = 0
+        for number in sorted({*BY_NUMBER} - {*ENDS}):
+            for argument in (None, 5, -1, b"", b"ab", b"\1\3\x80"):
+                if not pioneer.state.open:
+                    for each in (0, 1, 2, C.OPEN):
+                        pioneer.receive(Command(each).to_frame().to_bytes(), now)
+                pioneer.receive(Command(number, argument).to_frame().to_bytes(), now)
+                now += draw.choice((0, 5, 30)) * NS_PER_MS
+                pioneer.advance_to(now)
+                sent = b"".join(frame for frame in pioneer.take_output())
+                yield said((number, argument, events, sent.hex(), pioneer.state, pioneer.stats))
+                events.clear()
+
+
+def tables(draw: random.Random) -> Iterator[str]:  # noqa: C901, PLR0912 - a table after the other
+    """Yield FLASH, settings, faults and inputs at the ends of what each may be."""
+    p2dx = load_parameters("p2dx")
+    yield said((RANGES, DEFAULTS, FlashParameters().baud(), ControllerSettings()))
+    for name, limits in [*RANGES.items(), ("nme", (0, 1)), ("subclass", (0, 1))]:
+        for value in (limits[0] - 1, limits[0], limits[1], limits[1] + 1, True, 1.5, "2"):
+            yield tried(lambda name=name, value=value: FlashParameters().with_values({name: value}).values)
+    for text in ("Wilma", "a" * 300, "é", ""):
+        yield tried(lambda text=text: FlashParameters().with_values({"name": text, "serial": text}).text("name"))
+    with TemporaryDirectory() as folder:
+        path = Path(folder, "f.toml")
+        for text in ("[flash]", '[flash]\nname = "W"\nsipcycle = 50', "[flash]\n[other]", "[other]", "x = 1",
+                     "flash = 1", "[flash]\nnme = 1", "[flash]\n\nsipcycle = 0", "[[flash]]", "[flash"):  # fmt: skip
+            path.write_text(text)
+            yield tried(load_flash, path).replace(folder, "")
+        yield tried(load_flash, Path(folder, "none")).replace(folder, "")
+    for model in ("p2dx", "p3at-sh", "amigo", "powerbot"):
+        parameters = load_parameters(model)
+        flash = FlashParameters().with_values({"sipcycle": 50, "watchdog": 900, "name": "W", "hostbaud": 2})
+        yield said(flash.for_model(parameters))
+        for profile in Profile:
+            yield said(flash.config(parameters, profile))
+        yield said([ControllerSettings(profile=profile).family_of(parameters) for profile in (None, Profile.AROS)])
+    given: list[dict[str, Any]] = [
+        {}, {"client": "aria"}, {"client": "x"}, {"client": "aria", "firmware": Profile.AROS, "lenient": False,
+        "rear_sonar": False},
+        {"firmware": Profile.P2OS, "lenient": True, "laser": LASER, "all_sonar": True, "rear_sonar": True,
+        "baud": 9600},
+        {"client": "aria", "laser": LASER, "baud": 1}, {"flash": flash}, {"errors": REALISTIC, "client": "aria",
+        "flash": flash},
+    ]  # fmt: skip
+    for options in given:
+        yield tried(ControllerSettings.of, **options)
+    for key, values in {
+        "sip_period_ns": (999_999, 1_000_000, LONGEST_SIP_PERIOD_MS * NS_PER_MS, LONGEST_SIP_PERIOD_MS * NS_PER_MS + 1),
+        "battery_decivolts": (-1, 0, 255, 256), "baud": (None, 9600, 9601),
+    }.items():  # fmt: skip
+        yield said(
+            [tried(lambda key=key, value=value: getattr(ControllerSettings(**{key: value}), key)) for value in values]
+        )
+    texts = ["sonar-stuck 1 0", "sonar-stuck 8 100", "sonar-stuck 9 1", "sonar-stuck 0 1", "sonar-stuck 1 100.1",
+    "sonar-stuck 1 -0.1",
+             "sonar-noisy 2 0.5", "sonar-dead 3", "sonar-dead 3 1", "wheel-blocked left", "wheel-blocked front",
+             "line-noise 0.5",
+             "line-noise 0.51", "low-battery 25.5", "low-battery 25.6", "bumper rear 7", "bumper rear 8",
+             "bumper left 1", "", "x",
+             "sonar-ded 3", "reboot now", "sonar-stuck 1.5 1", "sonar-stuck +1 1"]  # fmt: skip
+    for text in texts:
+        yield said([tried(read_fault, text, sonar=8, complete=complete) for complete in (True, False)])
+        yield tried(lambda text=text: read_fault(text, sonar=8).text)
+    words = {"X": ("0", "1023", "1024"), "BUTTON": ("0", "1", "2"), "PORT": ("0", "1", "9", "10"), "RAW": ("0",
+    "1023", "1024"),
+             "BYTE": ("0", "255", "256"), "ON_OFF": ("on", "off", "1")}  # fmt: skip
+    body = make_body("kinematic", load_world("room"), p2dx)
+    pioneer = Pioneer(parameters=p2dx, body=body, settings=ControllerSettings())
+    for name, (needed, _) in INPUTS.items():
+        for number in range(4):
+            several = [words["X" if word == "Y" else word] for word in needed]
+            each = [one[number % len(one)] for one in several]
+            yield f"{name} {each} {tried(pioneer.do, ' '.join([name, *each]), number)}"
+    for rate, is_loose in ((0.0, False), (0.05, False), (0.5, True), (0.0, True)):
+        faults, stream = Faults(bit_error_rate=rate, is_loose=is_loose), RandomSource(4)
+        yield said([faults.corrupt(bytes(range(90)), stream, to_robot=way).hex() for way in (True, False, True)])
+        yield said(faults.corrupts_line)
+        yield said((faults.gap_in, faults.gap_out))
+    for angle in (-9.0, -math.pi, -math.pi / 2, 0.0, 1e-3, math.pi - 1e-3, math.pi, 7.0):
+        yield said([raw_angle(angle, counts) for counts in (4096, 360)])
+    reckoning = DeadReckoning(wheel_diameter_m=0.165, track_mm=330, left_wheel=1.01, right_wheel=0.99, track=1.02)
+    yield said(vars(DeadReckoning(wheel_diameter_m=0.2, track_mm=400)))
+    for bearing in (-1.58, -1.57, -1.0, -0.1, 0.0, 0.1, 0.7, 1.57, 1.58, 3.0):
+        yield said([_touched(segments, bearing) for segments in (0, 1, 5, 7)])
+    yield said([_middle(segments) for segments in (0, 1, 5, 6)])
+    left = right = 0.0
+    for number in range(12):
+        left, right = left + draw.choice((0.0, 0.3, -0.1)), right + draw.choice((0.0, 0.2))
+        reckoning.follow([free_wheels(left, right)] * 2)
+        if number % 5 == 4:
+            reckoning.set_origin()
+            reckoning.drift(0.01)
+        yield said((vars(reckoning), reckoning.heading_rad, reckoning.zero_rad, reckoning.raw_position(485_000)))
+
+
+TRACES: dict[str, Trace] = {each.__name__: each for each in (plain, erring, simulated, crowded, bumped, kinds, tables)}
+TRACES["figures"] = figures_of("p2os.pioneer.controller")
 test_what_was_approved_is_shown = judge_of(__file__, TRACES)
