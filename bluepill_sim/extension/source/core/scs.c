@@ -281,7 +281,7 @@ uint32_t system_read(struct shared *s, uint32_t address, uint64_t now, uint32_t 
     uint32_t answer = SYSTEM_KNOWN;
     *word = 0;
     if (address - STK_CTRL <= STK_CALIB - STK_CTRL) {
-        answer |= systick_advance(s, now) ? SYSTEM_TICKED : 0;
+        answer |= system_needs_time(address) && systick_advance(s, now) ? SYSTEM_TICKED : 0;
         *word = systick_read(s, (address - STK_CTRL) >> 2, now);
         return answer;
     }
