@@ -2,7 +2,7 @@
 
 A program is a list of pieces: stores to the system registers and to peripherals of every width and by every kind of
 instruction, bit-banding, interrupts with all priorities and masks, faults of every kind, sleep, loops that wait, other
-stacks, code in SRAM, vectors elsewhere. Each stands in its own 2 KB of flash with its own vectors.
+stacks, code in SRAM, vectors elsewhere. Each stands in its own 2 KB of flash, and a little, with its own vectors.
 
 R7 is the middle of a scratch area, R11 says where the program goes on behind a fault. All handlers note what they serve
 in SRAM, in order: a product sum at `NOTES`.
@@ -19,7 +19,7 @@ from tests.bluepill_sim.core.thumb_streams import SCRATCH, Stream
 from tests.bluepill_sim.machine import COUNTER_ON, FLASH, STACK, Assembler
 
 #: What a program has of the flash; its code stands behind its vectors.
-ROOM, CODE_AT, EXCEPTIONS = 0x800, 0x100, 16 + 43
+ROOM, CODE_AT, EXCEPTIONS = 0x880, 0x140, 76
 #: SRAM: what handlers note, a copy of the vectors, code, the process stack.
 NOTES, VECTORS, CODE, PROCESS_STACK = 0x2000_0100, 0x2000_2000, 0x2000_3000, 0x2000_4000
 _PIECES = 16
@@ -75,6 +75,11 @@ ldr r2, [r1, #0]
 movs r3, #37
 muls r2, r3
 adds r2, r2, r0
+mov32 r0, #0xE000ED04
+ldr r3, [r0, #32]
+adds r2, r2, r3
+ldr r3, [r0, #0]
+adds r2, r2, r3
 str r2, [r1, #0]
 """
 #: A fault goes on at R11 outside IT blocks, with the bits of its status cleared.
@@ -122,7 +127,7 @@ class ProgramWriter:
             self.conditional, self.ambiguous, self.bits, self.bits, self.unaligned, self.supervisor_call, self.request,
             self.request, self.masks, self.fault, self.fault, self.sleep, self.delay, self.wait, self.exclusive,
             self.process_stack, self.unprivileged, self.sram_code, self.other_vectors, self.odd_stack, self.tick,
-            self.timer, self.calls, self.many_reads, self.priorities, self.returns,
+            self.timer, self.calls, self.many_reads, self.priorities, self.returns, self.pin_modes,
         )  # fmt: skip
 
     def written(self) -> str:
@@ -357,6 +362,22 @@ class ProgramWriter:
                 f"mov32 r1, #0x40010808\n{label}: ldr r0, [r1, #0]\n.half 0x0840\nbcc {label}\n",
                 f"mov32 r1, #0x40010808\n{label}: ldr r0, [r1, #0]\nmovs r2, #1\n.half 0x4210\nbne {label}\n",
             )
+        )
+
+    def pin_modes(self) -> str:
+        """Give pins modes, some of which they have already, by code in flash and in SRAM."""
+        pin = self._dice.randrange(7)
+        bits, mode = 0xF << 4 * pin, self._dice.choice((3, 4, 8, 0)) << 4 * pin
+        change = (
+            f"mov32 r3, #{bits}\nmov32 r5, #{mode}\nldr r2, [r1, #0]\n.half 0x439A\n.half 0x432A\nstr r2, [r1, #0]\n"
+        )
+        at = CODE + 0x100
+        return (
+            f"mov32 r1, #0x40010800\n{change}{change}str r5, [r7, #0]\nldr r2, [r1, #0]\n.half 0x439A\n"
+            "ldr r6, [r7, #0]\n"
+            f".half 0x4332\nstr r2, [r1, #0]\nmov32 r0, #{at}\nmov32 r6, #0x439A680A\nstr r6, [r0, #0]\n"
+            "mov32 r6, #0x600A432A\nstr r6, [r0, #4]\nmov32 r6, #0xBF004770\nstr r6, [r0, #8]\nadds r0, #1\n"
+            "blx r0\n"
         )
 
     def many_reads(self) -> str:

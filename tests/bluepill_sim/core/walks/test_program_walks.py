@@ -32,12 +32,21 @@ _NVIC = ("pending", "active", "enabled", "levels", "priority_grouping")
 
 @cache
 def _image() -> tuple[Image, list[tuple[int, int]]]:
-    return assembled(PROGRAMS, "programs")
+    return assembled(PROGRAMS, "n")
 
 
 def _board(core: str) -> BluePill:
     with core_chosen(core):
         return BluePill(_image()[0])
+
+
+def _request(board: BluePill, line: int, *, stays: bool) -> None:
+    """Have an interrupt come, at times of a chip of the family that has more of them; its line may stay high."""
+    nvic = board.chip.processor.nvic
+    nvic.enabled |= 1 << line
+    nvic.set_level(line, True)
+    board.chip.processor.pending_changed()
+    nvic.set_level(line, stays)
 
 
 def _shown(board: BluePill) -> str:
@@ -51,7 +60,7 @@ def _shown(board: BluePill) -> str:
     system = " ".join(str(getattr(processor, name)) for name in _SYSTEM)
     nvic = " ".join(f"{getattr(processor.nvic, name):x}" for name in _NVIC)
     memory = zlib.crc32(board.read_memory(0x2000_0000, 0x5000) or b"")
-    parts = zlib.crc32(b"".join(bytes(part.words) for part in chip.parts.by_name.values()))
+    parts = zlib.crc32(b"".join(bytes(part.words) + part.held for part in chip.parts.by_name.values()))
     tick = f"{processor.systick.next_cycle} {processor.shared.tick_control} {processor.shared.tick_count_flag}"
     rows = zlib.crc32(str(board.last_rows).encode())
     at = f"{board.now_ns} {chip.engine.cycle} {board.pc:x}"
@@ -81,6 +90,8 @@ def _lines(board: BluePill, number: int, base: int, stop: int) -> Iterator[str]:
     chip.engine.jump(chip.memory.read_word(base + 4) or 0)
     for turn in range(SLICES):
         board.pin("PA0").drive(bool(turn % 2))
+        if dice.random() < 0.15:
+            _request(board, dice.choice((1, 5, 47, 48, 59)), stays=dice.random() < 0.1)
         if turn == SLICES // 3:
             saved = board.snapshot()
             board.advance_to(board.now_ns + 2_000)
