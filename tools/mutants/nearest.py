@@ -39,7 +39,9 @@ TESTS_OF_C = {
           for name in ("exceptions", "faults", "imprecise_faults", "late_arrival", "masks", "stacks", "time", "traps")),
         *(f"tests/bluepill_sim/native/test_native_{name}.py" for name in ("system", "core", "polling", "ambiguous")),
         "tests/bluepill_sim/core/interpreter/test_exact.py", "tests/bluepill_sim/core", "tests/bluepill_sim/native"),
-    "bluepill_sim/extension/source/fabric": ("tests/bluepill_sim/fabric", "tests/bluepill_sim/test_timers.py",
+    "bluepill_sim/extension/source/fabric": (*(f"tests/bluepill_sim/peripherals/walks/test_{name}_walks.py"
+                                               for name in ("tim", "spi_i2c", "usart", "adc_dma")),
+                                             "tests/bluepill_sim/fabric", "tests/bluepill_sim/test_timers.py",
                                              "tests/bluepill_sim/peripherals/tim/test_tim.py",
                                              "tests/bluepill_sim/core/test_core_parts.py", "tests/bluepill_sim/native"),
     "bluepill_sim/extension/source": ("tests/bluepill_sim/fabric", "tests/bluepill_sim/native", "tests/bluepill_sim"),

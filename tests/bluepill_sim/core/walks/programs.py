@@ -60,7 +60,10 @@ _FAULTS = (
     "mov32 r1, #0x20000201\nstrd r0, r2, [r1]", "movs r1, #0\nudiv r0, r0, r1", "movs r1, #0\nsdiv r0, r0, r1",
     ".half 0xEE00, 0x0A10", "mov32 r1, #0x20000200\nbx r1", "mov32 r1, #0x40010001\nbx r1",
     "mov32 r1, #0x70000001\nbx r1",
-    "mov32 r1, #0xFFFFFFF9\nbx r1", "mov32 r1, #0xE000E001\nbx r1", "bkpt #3", "mov32 r1, #0x20000203\nldrex r0, [r1]",
+    "mov32 r1, #0xFFFFFFF9\nbx r1",
+    *(f"mov32 r1, #{at}\nbx r1" for at in (0x5FFF_FFFF, 0x6000_0001, 0x9FFF_0001, 0xA000_0001,
+                                         0x3FFF_FFFF, 0x1FFF_0001)),
+    "mov32 r1, #0xE000E001\nbx r1", "bkpt #3", "mov32 r1, #0x20000203\nldrex r0, [r1]",
     "mov32 r1, #0x1FFFFFFC\nldmia r1!, {r0, r2, r3}", "mov32 r1, #0x20004FF8\nldmia.w r1, {r0, r2, r3, r4}",
     "mov32 r1, #0x1FFF0000\nldr r0, [r1, #0]", "mov32 r1, #0xE0050000\nldr r0, [r1, #0]",
     "mov32 r1, #0xE000ED02\nldr r0, [r1, #0]",
@@ -128,6 +131,7 @@ class ProgramWriter:
             self.request, self.masks, self.fault, self.fault, self.sleep, self.delay, self.wait, self.exclusive,
             self.process_stack, self.unprivileged, self.sram_code, self.other_vectors, self.odd_stack, self.tick,
             self.timer, self.calls, self.many_reads, self.priorities, self.returns, self.pin_modes,
+            self.flash_write,
         )  # fmt: skip
 
     def written(self) -> str:
@@ -379,6 +383,22 @@ class ProgramWriter:
             "mov32 r6, #0x600A432A\nstr r6, [r0, #4]\nmov32 r6, #0xBF004770\nstr r6, [r0, #8]\nadds r0, #1\n"
             "blx r0\n"
         )
+
+    def flash_write(self) -> str:
+        """Program halfwords of the flash, with waiting and without; some of them twice, or locked."""
+        lines = (
+            "mov32 r1, #0x40022000\nmov32 r0, #0x45670123\nstr r0, [r1, #4]\nmov32 r0, #0xCDEF89AB\nstr r0, [r1, #4]\n"
+        )
+        lines += f"movs r0, #{self._dice.choice((1, 1, 1, 0))}\nstr r0, [r1, #16]\n"
+        for _ in range(self._dice.randrange(1, 3)):
+            name, wait = self._dice.choice(("strh", "strh", "str", "strb")), self._label()
+            lines += (
+                f"mov32 r3, #{FLASH + 0xFF10 + 4 * self._dice.randrange(4)}\n"
+                f"movs r0, #{self._dice.randrange(256)}\n{name} r0, [r3, #0]\n"
+            )
+            if self._dice.randrange(3):
+                lines += f"{wait}: ldr r0, [r1, #12]\n.half 0x0840\nbcs {wait}\n"
+        return f"{lines}ldr r0, [r3, #0]\nadds r4, r4, r0\nmovs r0, #0x80\nstr r0, [r1, #16]\n"
 
     def many_reads(self) -> str:
         """Read one register many times in a row."""

@@ -22,7 +22,7 @@ SPANS_NS = (1, 125, 1_000, 4_000, 20_000, 60_000)
 #: The cores that go from block to block, and so show the same.
 CORES = ("native", "python", "own")
 _SPECIAL = (Reg.XPSR, Reg.CONTROL, Reg.MSP, Reg.PSP, Reg.PRIMASK, Reg.BASEPRI, Reg.FAULTMASK)
-_MSP, _BASEPRI = 17, 20
+_MSP, _PSP, _BASEPRI = 17, 18, 20
 _SYSTEM = (
     "exception_number", "sleep", "event_register", "vector_table", "scr", "ccr", "shcsr", "cfsr", "hfsr", "mmfar",
     "bfar", "is_locked_up", "last_sleep_cycle", "bus_error_cycle", "bus_error_pc", "bus_error_address",
@@ -53,7 +53,8 @@ def _shown(board: BluePill) -> str:
     """Return all that decides what comes next, and what was seen of the last blocks."""
     chip, processor = board.chip, board.chip.processor
     values = [chip.engine.registers[one] for one in (*GENERAL[:15], *_SPECIAL)]
-    values[_BASEPRI] &= 0xF0  # Unicorn keeps the rest of it for a while,
+    values[_BASEPRI] &= 0xF0  # Unicorn keeps the rest of it for a while, as that of stacks,
+    values[_PSP] &= ~3
     if not processor.is_privileged:  # and shows a thread without privilege neither stacks nor masks
         values[_MSP:] = [0] * len(values[_MSP:])
     registers = " ".join(f"{value:x}" for value in values)
@@ -73,14 +74,17 @@ def _episodes(core: str, _: random.Random) -> Iterator[str]:
     fresh = board.snapshot()
     for number, (base, stop) in enumerate(_image()[1]):
         board.restore(fresh)
-        yield "\n".join([f"program {number}", *_lines(board, number, base, stop)])
+        yield "\n".join([f"program {number}", *_lines(board, number, base, stop, is_exact=core == "exact")])
 
 
-def _lines(board: BluePill, number: int, base: int, stop: int) -> Iterator[str]:
+def _lines(board: BluePill, number: int, base: int, stop: int, *, is_exact: bool) -> Iterator[str]:
     """Yield what a program shows from time to time; some are watched, recorded, saved and restored."""
     dice, chip = random.Random(f"slices {number}"), board.chip
     edges: list[tuple[str, str, int]] = []
     rows: list[tuple[int, ...]] = []
+    if number % 3 == 2 and is_exact:
+        with core_chosen("exact"):
+            chip.latency.vary(seed=number, most=30)
     pins = listen(board, edges) if number % 2 else None
     recorder = chip.record_blocks(1000, lambda full: rows.extend(full.drain())) if number % 5 == 3 else None
     chip.system.write(0xED08, 4, base)
@@ -105,7 +109,7 @@ def _lines(board: BluePill, number: int, base: int, stop: int) -> Iterator[str]:
         chip.stop_recording()
     if pins is not None:
         pins.close()
-    yield f"{rows} {edges} {[str(warning) for warning in board.warnings]} {board.fault}"
+    yield f"{rows} {edges} {[str(warning) for warning in board.warnings]} {board.fault!r}"
 
 
 TRACES = {core: partial(_episodes, core) for core in (*CORES, "exact")}

@@ -101,12 +101,11 @@ def _sweep(_: random.Random) -> Iterator[str]:
     fresh, shared = bus.board.snapshot(), bus.system.shared
     for has_trace in (False, True):
         bus.board.restore(fresh)
-        if has_trace:
-            for address, word in ((_DEMCR, 0x0100_0000), (_LAR, 0xC5AC_CE55)):
-                bus.write(address, 4, word)
         for first, end in RANGES:
             for address in range(first, end, 4):
                 offset = address - PPB_BASE
+                for key, word in ((_DEMCR, 0x0100_0000), (_LAR, 0xC5AC_CE55)) if has_trace else ():
+                    bus.write(key, 4, word)
                 shared.cfsr = shared.hfsr = shared.dfsr = 0xFFFF_FFFF
                 known = f"{bus.system.is_modelled(offset):d}{bus.system.is_open_to_all(offset):d}"
                 line = f"{address:x} {known} {bus.read(address)}"

@@ -296,7 +296,8 @@ class Walker:
             (
                 None, 1.65, 1.649999, -0.5, 4.2,
                 *(
-                    Oscillation(shape=shape, low_v=-0.25, high_v=dice.choice((3.1, 999.5)), period_ns=period_ns, phase_ns=period_ns // 3,
+                    Oscillation(shape=shape, low_v=-0.25, high_v=dice.choice((3.1, 999.5)),
+                                period_ns=period_ns, phase_ns=period_ns // 3,
                                 high_ns=dice.choice((None, 0, period_ns // 4)))
                     for shape in Waveform
                 ),
