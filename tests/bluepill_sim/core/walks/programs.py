@@ -297,6 +297,7 @@ class ProgramWriter:
         lines = f"mov32 r1, #0xE000E100\nmov32 r0, #{self._word() | 0x10000040}\nstr r0, [r1, #0]\nstr r0, [r1, #4]\n"
         for address in (0xE000E400, 0xE000E404, 0xE000E41C, 0xE000ED18, 0xE000ED1C, 0xE000ED20):
             lines += f"mov32 r1, #{address}\nmov32 r0, #{self._dice.getrandbits(32)}\nstr r0, [r1, #0]\n"
+        lines += f"mov32 r1, #0xE000ED24\nmov32 r0, #{self._dice.randrange(8) << 16}\nstr r0, [r1, #0]\n"
         return (
             f"{lines}mov32 r1, #0xE000ED0C\nmov32 r0, #{0x05FA0000 | self._dice.randrange(8) << 8}\nstr r0, [r1, #0]\n"
         )
@@ -308,7 +309,9 @@ class ProgramWriter:
              f"movs r0, #{self._dice.randrange(256)}\n.half 0xF380, 0x8812\n", "movs r0, #1\nmsr primask, r0\n",
              "movs r0, #1\nmsr faultmask, r0\n")
         )  # fmt: skip
-        within = self._dice.choice((self.request, self.system, self.arithmetic, self.tick, self.sleep))()
+        within = self._dice.choice(
+            (self.request, self.request, self.system, self.arithmetic, self.tick, self.sleep, self.fault)
+        )()
         reads = "".join(
             f"mrs r0, {name}\nadds r4, r4, r0\n" for name in ("primask", "basepri", "faultmask", "control", "msp")
         )
@@ -470,7 +473,8 @@ class ProgramWriter:
 
     def odd_stack(self) -> str:
         """Take an exception on a stack that is no multiple of 8."""
-        return f".half 0xB081\n{self._dice.choice(('svc #3', self.request(), 'nop'))}\nnop\n.half 0xB001\n"
+        align = f"mov32 r1, #0xE000ED14\nmov32 r0, #{self._dice.choice((0, 0x200, 0x218))}\nstr r0, [r1, #0]\n"
+        return f"{align}.half 0xB081\n{self._dice.choice(('svc #3', self.request(), 'nop'))}\nnop\n.half 0xB001\n"
 
     def tick(self) -> str:
         """Start SysTick, with or without its interrupt."""

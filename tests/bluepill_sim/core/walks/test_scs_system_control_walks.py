@@ -31,6 +31,7 @@ _OWN = {"sram", "flash", "scratch", "fault", "last", "logged", "exact_stops", "i
 _AIRCR, _DEMCR, _LAR, _TCR, _TER = 0xE000_ED0C, 0xE000_EDFC, 0xE000_0FB0, 0xE000_0E80, 0xE000_0E00
 #: Written now and then, since much hangs on them.
 _KEYS = (
+    (0xE000_0000, 0x1234_5678), (0xE000_0004, 0xFFFF_FFFF), (0xE000_007C, 1),
     (_LAR, 0xC5AC_CE55), (_LAR, 1), (_DEMCR, 0x0107_0000), (_DEMCR, 0), (_AIRCR, 0x05FA_0300),
     (_AIRCR, 0x05FA_0702), (_AIRCR, 0x05FA_0000), (_AIRCR, 0x1234_0700), (_TCR, 1), (_TER, 0xFFFF_FFFF),
     (0xE000_E010, 7), (0xE000_E010, 3), (0xE000_E014, 99), (0xE000_E014, 0), (0xE000_E018, 5),
@@ -124,6 +125,8 @@ def _walk(_: random.Random) -> Iterator[str]:
         kind, address = dice.randrange(10), dice.choice(words)
         size = dice.choice((4, 4, 4, 2, 1))
         address += dice.randrange(0, 4, size)
+        if step % 40 == 0:
+            bus.system.enable_trace()
         if step == STEPS // 2:
             saved = bus.board.snapshot()
             bus = _Bus()
