@@ -38,6 +38,7 @@ TESTS_OF_C = {
         *(f"tests/bluepill_sim/core/test_{name}.py"
           for name in ("exceptions", "faults", "imprecise_faults", "late_arrival", "masks", "stacks", "time", "traps")),
         *(f"tests/bluepill_sim/native/test_native_{name}.py" for name in ("system", "core", "polling", "ambiguous")),
+        "tests/bluepill_sim/peripherals/walks/test_adc_dma_walks.py",
         "tests/bluepill_sim/core/interpreter/test_exact.py", "tests/bluepill_sim/core", "tests/bluepill_sim/native"),
     "bluepill_sim/extension/source/fabric": (*(f"tests/bluepill_sim/peripherals/walks/test_{name}_walks.py"
                                                for name in ("tim", "spi_i2c", "usart", "adc_dma")),

@@ -24,7 +24,7 @@ struct region_user {
 /* An unaligned access is made in at most so many. */
 enum { PARTS = 16 };
 
-enum { DWT_CTRL = 0xE0001000, DWT_CYCCNT = 0xE0001004, SCS = 0xE000E000, DEMCR = 0xE000EDFC, STK_CTRL = 0xE000E010, SCB_AIRCR = 0xE000ED0C, SCB_CCR = 0xE000ED14, STIR = 0xE000EF00 };
+enum { SCS = 0xE000E000, DEMCR = 0xE000EDFC, STK_CTRL = 0xE000E010, SCB_AIRCR = 0xE000ED0C, SCB_CCR = 0xE000ED14, STIR = 0xE000EF00 };
 #define IN_PAGE ((1u << PAGE_SHIFT) - 1)
 
 /* What Unicorn hands back at each access of a region; it is freed with the core. */
@@ -59,14 +59,13 @@ int general(uint8_t number)
     return number < 13 ? REG_R0 + number : number == 13 ? REG_SP : number == 14 ? REG_LR : REG_PC;
 }
 
-/* Whether an instruction reaches for some bytes; one that is not aligned loads the words that have its own in them. */
-static bool reaches(struct core *core, const struct instruction *one, uint32_t address, uint32_t bytes)
+static bool reaches(struct core *core, const struct instruction *one, uint32_t address)
 {
     uint32_t at = read_register(core, general(one->base)) + (uint32_t)one->offset;
     if (one->index != 255) {
         at += read_register(core, general(one->index)) << one->shift;
     }
-    return address - at < (uint32_t)one->bytes * one->count || at - address < bytes;
+    return address - at < (uint32_t)one->bytes * one->count;
 }
 
 /* The first instruction from `n` on that makes accesses of this kind and width; `count` of the row for none. */
@@ -78,40 +77,22 @@ static uint32_t fitting(const struct row *row, uint32_t n, bool is_write, uint32
     return n;
 }
 
-/* The first instruction from `n` on that may make the access; `count` of the row for none. */
-static uint32_t reaching(struct core *core, uint32_t n, uint32_t address, bool is_write, uint32_t bytes)
-{
-    const struct row *row = core->block;
-    do {
-        n = fitting(row, n, is_write, bytes);
-    } while (n < row->count && !reaches(core, &row->instructions[n], address, bytes) && ++n);
-    return n;
-}
-
-/* The same of an access or a part of one that is not aligned: then of a wider one. */
-static uint32_t reaching_in_parts(struct core *core, uint32_t n, uint32_t address, bool is_write, uint32_t *bytes)
-{
-    uint32_t found = reaching(core, n, address, is_write, *bytes);
-    while (found == core->block->count && *bytes < 4) {
-        found = reaching(core, n, address, is_write, *bytes *= 2);
-    }
-    return found;
-}
-
 /* The instruction that makes an access: the only one of its kind that is left, or the first that reaches there. */
 static uint32_t find_access(struct core *core, uint32_t address, bool is_write, uint32_t bytes)
 {
     const struct row *row = core->block;
-    const uint32_t n = fitting(row, core->io_next, is_write, bytes);
-    const bool is_only = n < row->count && fitting(row, n + 1, is_write, bytes) == row->count;
-    return is_only ? n : reaching_in_parts(core, n < row->count ? n : core->io_next, address, is_write, &bytes);
+    uint32_t n = fitting(row, core->io_next, is_write, bytes);
+    if (n < row->count && fitting(row, n + 1, is_write, bytes) < row->count) {
+        while (n < row->count && !reaches(core, &row->instructions[n], address)) {
+            n = fitting(row, n + 1, is_write, bytes);
+        }
+    }
+    return n;
 }
 
-/* The next access may be of the same instruction where that makes several. */
-static void pass(struct core *core, uint32_t n, uint32_t bytes)
+static void pass(struct core *core, uint32_t n)
 {
-    const struct instruction *one = &core->block->instructions[n];
-    core->io_next = one->count > 1 || one->bytes != bytes ? n : n + 1;
+    core->io_next = core->block->instructions[n].count > 1 ? n : n + 1;
 }
 
 /* Notes an access whose instruction is not looked for now, so that the next one of the block is not taken for it. */
@@ -127,19 +108,22 @@ void skip(struct core *core, uint32_t address, bool is_write, uint32_t bytes)
     }
 }
 
-static void set_access(struct core *core, uint32_t n, uint32_t bytes)
+static void set_access(struct core *core, uint32_t n)
 {
     const struct instruction *one = &core->block->instructions[n];
     core->shared.access_cycle = core->shared.cycle + one->cycle;
     core->shared.access_pc = one->address;
-    pass(core, n, bytes);
+    pass(core, n);
 }
 
-/* Whether an instruction may make an access: those of several words are on their way, with other registers. */
-static bool is_by(struct core *core, uint32_t n, uint32_t address, bool is_write, uint32_t bytes)
+/* The first instruction from `n` on that may make the access; `count` of the row for none. */
+static uint32_t reaching(struct core *core, uint32_t n, uint32_t address, bool is_write, uint32_t bytes)
 {
-    const struct instruction *one = &core->block->instructions[n];
-    return one->kind == (is_write ? 2 : 1) && (one->count > 1 || reaches(core, one, address, bytes));
+    const struct row *row = core->block;
+    do {
+        n = fitting(row, n, is_write, bytes);
+    } while (n < row->count && !reaches(core, &row->instructions[n], address) && ++n);
+    return n;
 }
 
 /* `resolve` where accesses may be mistaken: false where the run is to be stopped to learn it. */
@@ -148,13 +132,12 @@ static bool resolve_ambiguous(struct core *core, uint32_t address, bool is_write
     struct located *located = &core->located;
     const struct row *row = core->block;
     if (located->cycle != core->shared.cycle || !located->words ||
-        (address != located->address && !located->is_anywhere) || !is_by(core, located->n, address, is_write, bytes)) {
-        uint32_t width = bytes;
-        const uint32_t n = reaching_in_parts(core, core->io_next, address, is_write, &width);
-        if (n == row->count) {
+        (address != located->address && !located->is_anywhere)) {
+        const uint32_t n = reaching(core, core->io_next, address, is_write, bytes);
+        if (n == row->count) { /* half of an unaligned access */
             return true;
         }
-        if (reaching(core, n + 1, address, is_write, width) < row->count) {
+        if (reaching(core, n + 1, address, is_write, bytes) < row->count) {
             core->is_stopping = 1;
             core->api.stop(core->unicorn);
             return false;
@@ -164,7 +147,7 @@ static bool resolve_ambiguous(struct core *core, uint32_t address, bool is_write
     --located->words;
     located->address = address + 4;
     located->is_anywhere &= located->words >= PARTS;
-    set_access(core, located->n, bytes);
+    set_access(core, located->n);
     return true;
 }
 
@@ -217,7 +200,7 @@ bool resolve(struct core *core, uint32_t address, bool is_write, uint32_t bytes)
         const struct skipped *one = &core->skipped[k];
         const uint32_t n = find_access(core, one->address, one->is_write, one->bytes);
         if (n < row->count) {
-            pass(core, n, one->bytes);
+            pass(core, n);
         }
     }
     core->skipped_count = 0;
@@ -226,7 +209,7 @@ bool resolve(struct core *core, uint32_t address, bool is_write, uint32_t bytes)
         found = fitting(row, core->io_next, is_write, bytes);
     }
     if (found < row->count) {
-        set_access(core, found, bytes);
+        set_access(core, found);
     }
     return true;
 }
@@ -519,7 +502,7 @@ static bool write_system(struct core *core, uint32_t address, uint32_t size, uin
     const uint32_t mask = (size == 4 ? UINT32_MAX : (1u << 8 * size) - 1) << 8 * (address & 3);
     const bool is_systick = at - STK_CTRL <= 8;
     if (!may_access(core) || !is_privileged(core) || at == SCB_AIRCR || at == SCB_CCR ||
-        (at < SCS && ((at != DWT_CTRL && at != DWT_CYCCNT) || s->dwt_function[0])) || at == DEMCR ||
+        at < SCS || at == DEMCR ||
         !(system_has(at) || at == STIR) ||
         (is_systick && s->hears_ticks)) {
         return false;

@@ -66,8 +66,8 @@ _FAULTS = (
     "mov32 r1, #0xE000E001\nbx r1", "bkpt #3", "mov32 r1, #0x20000203\nldrex r0, [r1]",
     "mov32 r1, #0x1FFFFFFC\nldmia r1!, {r0, r2, r3}", "mov32 r1, #0x20004FF8\nldmia.w r1, {r0, r2, r3, r4}",
     "mov32 r1, #0x1FFF0000\nldr r0, [r1, #0]", "mov32 r1, #0xE0050000\nldr r0, [r1, #0]",
-    "mov32 r1, #0xE000ED02\nldr r0, [r1, #0]",
-    "mov32 r1, #0x22000001\nldr r0, [r1, #0]", "mov32 r1, #0x40000002\nldr r0, [r1, #0]",
+    "mov32 r1, #0xE000ED02\nldrh r0, [r1, #0]",
+    "mov32 r1, #0x22000001\nldrb r0, [r1, #0]", "mov32 r1, #0x40000002\nldrh r0, [r1, #0]",
     "mov32 r1, #0xA0000000\nstr r0, [r1, #0]\ndsb",
 )  # fmt: skip
 
@@ -131,7 +131,7 @@ class ProgramWriter:
             self.request, self.masks, self.fault, self.fault, self.sleep, self.delay, self.wait, self.exclusive,
             self.process_stack, self.unprivileged, self.sram_code, self.other_vectors, self.odd_stack, self.tick,
             self.timer, self.calls, self.many_reads, self.priorities, self.returns, self.pin_modes,
-            self.flash_write,
+            self.flash_write, self.narrow,
         )  # fmt: skip
 
     def written(self) -> str:
@@ -177,7 +177,8 @@ class ProgramWriter:
             address, bits = self._dice.choice(_SYSTEM)
             name, step = self._dice.choice((("str", 0), ("str", 0), ("str", 0), ("strh", 2), ("strb", 1)))
             address += step * self._dice.randrange(4 // (step or 4))
-            lines += f"mov32 r1, #{address}\nmov32 r0, #{self._word() & bits}\n{name} r0, [r1, #0]\nldr r2, [r1, #0]\n"
+            lines += f"mov32 r1, #{address}\nmov32 r0, #{self._word() & bits}\n{name} r0, [r1, #0]\n"
+            lines += f"mov32 r1, #{address & ~3}\nldr r2, [r1, #0]\nadds r5, r5, r2\n"
         return lines
 
     def system_read(self) -> str:
@@ -246,7 +247,7 @@ class ProgramWriter:
                     "str r5, [r1, #0]\n"
                 ),
                 f"mov32 r1, #{address}\nldmia r1!, {{r0, r2, r3}}\nsubs r1, #12\nldmia r1!, {{r0, r2, r5}}\n",
-                f"mov32 r1, #{address + 2}\nldr r0, [r1, #0]\nadds r1, #0\nldr r2, [r1, #0]\n",
+                f"mov32 r1, #{address + 2}\nldrh r0, [r1, #0]\nadds r1, #0\nldrh r2, [r1, #0]\n",
             )
         )
 
@@ -265,9 +266,7 @@ class ProgramWriter:
 
     def unaligned(self) -> str:
         """Access words and halfwords at odd addresses."""
-        base = self._dice.choice(
-            (SCRATCH, SCRATCH, 0x2000_4FFC, 0x4001_0808, 0x4000_0024, 0x4001_0C00, 0x2200_0400, 0xE000_ED00)
-        )
+        base = self._dice.choice((SCRATCH, SCRATCH, 0x2000_4FFC, 0x0800_0000, 0x1FFF_F7E0))
         lines = f"mov32 r1, #{base + self._dice.randrange(1, 4)}\n"
         for _ in range(self._dice.randrange(1, 3)):
             name = self._dice.choice(("ldr r0", "str r4", "ldrh r0", "strh r5"))
@@ -402,6 +401,20 @@ class ProgramWriter:
             if self._dice.randrange(3):
                 lines += f"{wait}: ldr r0, [r1, #12]\n.half 0x0840\nbcs {wait}\n"
         return f"{lines}ldr r0, [r3, #0]\nadds r4, r4, r0\nmovs r0, #0x80\nstr r0, [r1, #16]\n"
+
+    def narrow(self) -> str:
+        """Store bytes and halfwords in a system register that takes all bits."""
+        address, begin, other = (
+            self._dice.choice((0xE000ED34, 0xE000ED38, 0xE0042004)),
+            *self._dice.sample((0, 0xFFFF_FFFF), 2),
+        )
+        name, offset = self._dice.choice((("strb", 0), ("strb", 1), ("strb", 2), ("strb", 3), ("strh", 0), ("strh", 2)))
+        return (
+            f"mov32 r1, #{address}\nmov32 r0, #{begin}\nstr r0, [r1, #0]\nmov32 r0, #{other}\n"
+            f"{name} r0, [r1, #{offset}]\n"
+            f"ldr r0, [r1, #0]\nadds r4, r4, r0\nldrh r0, [r1, #2]\nadds r4, r4, r0\nldrb r0, [r1, #{offset}]\n"
+            "adds r5, r5, r0\n"
+        )
 
     def many_reads(self) -> str:
         """Read one register many times in a row."""

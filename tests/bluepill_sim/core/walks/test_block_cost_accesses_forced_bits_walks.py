@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from bluepill_sim.core.accesses import accesses_of, is_ambiguous, may_end_in_it, may_write
 from bluepill_sim.core.block_cost import measure_block
 from bluepill_sim.core.forced_bits import forced_bits
+from bluepill_sim.core.thumb import decode_all
 from tests.bluepill_sim.core.interpreter.lockstep import ROWS, filled
 from tests.tools.suite.approved import judge_of
 
@@ -48,10 +49,10 @@ def _shown(code: bytes, start: int) -> str:
         f"{one.address:x} {one.is_load:d} {one.bytes} {one.base} {one.offset} {one.index} {one.shift} {one.count}"
         for one in accesses_of(code, start)
     ]
+    parts = [repr(each)[12:-1] for each in decode_all(code, start)]
     written = [f"{may_write(code, at):x}" for at in range(0, len(code) - 1, 2)]
-    return (
-        f"{code.hex()} {costs} {kinds} {asked} {reached} {written} {may_end_in_it(code):d}{is_ambiguous(code, start):d}"
-    )
+    ends = f"{may_end_in_it(code):d}{is_ambiguous(code, start):d}"
+    return f"{code.hex()} {costs} {kinds} {parts} {asked} {reached} {written} {ends}"
 
 
 def _encodings(_: random.Random) -> Iterator[str]:

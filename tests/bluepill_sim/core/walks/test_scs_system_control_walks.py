@@ -28,7 +28,7 @@ RANGES = (
 )  # fmt: skip
 #: Addresses of the host, and what only a run sets.
 _OWN = {"sram", "flash", "scratch", "fault", "last", "logged", "exact_stops", "is_python"}
-_AIRCR, _DEMCR, _LAR, _TCR, _TER = 0xE000_ED0C, 0xE000_EDFC, 0xE000_0FB0, 0xE000_0E80, 0xE000_0E00
+_AIRCR, _DEMCR, _LAR, _TCR, _TER, _STIR = 0xE000_ED0C, 0xE000_EDFC, 0xE000_0FB0, 0xE000_0E80, 0xE000_0E00, 0xE000_EF00
 #: Written now and then, since much hangs on them.
 _KEYS = (
     (0xE000_0000, 0x1234_5678), (0xE000_0004, 0xFFFF_FFFF), (0xE000_007C, 1),
@@ -115,6 +115,8 @@ def _sweep(_: random.Random) -> Iterator[str]:
                         continue
                     line += f" {bus.write(address, 4, word)}:{bus.read(address)} {bus.changed()}"
                 yield line
+    for number in range(50):
+        yield f"STIR {number} {bus.write(_STIR, 4, number)} {bus.changed()}"
     yield "\n".join(map(str, bus.board.warnings))
 
 
