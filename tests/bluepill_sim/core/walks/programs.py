@@ -253,10 +253,11 @@ class ProgramWriter:
 
     def bits(self) -> str:
         """Access single bits by their aliases."""
-        place = self._dice.choice(
-            (0x2200_0000 + 32 * (SCRATCH - 0x2000_0000 + self._dice.randrange(64)), 0x2200_0000 + 32 * 0x4FFF,
-             0x2200_0000 + 32 * 0x5000, *(0x4200_0000 + 32 * (each - 0x4000_0000) for each in _PERIPHERALS[:24]))
-        )  # fmt: skip
+        places = (
+            *(0x2200_0000 + 32 * at for at in (SCRATCH - 0x2000_0000 + self._dice.randrange(64), 0x4FFF, 0x5000)),
+            *(0x4200_0000 + 32 * (each - 0x4000_0000) for each in _PERIPHERALS[:24]),
+        )
+        place = self._dice.choice((places[0], self._dice.choice(places)))
         lines = f"mov32 r1, #{place + 4 * self._dice.randrange(32)}\nmov32 r0, #{self._word()}\n"
         for _ in range(self._dice.randrange(1, 4)):
             name = self._dice.choice(("str", "ldr", "strb", "ldrb", "strh", "ldrh"))

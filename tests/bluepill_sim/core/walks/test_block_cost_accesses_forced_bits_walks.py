@@ -70,6 +70,24 @@ def _encodings(_: random.Random) -> Iterator[str]:
         yield "\n".join(lines)
 
 
+def _branches(_: random.Random) -> Iterator[str]:
+    """Yield branches to all places near by, and to some far away."""
+    for halfwords in (*range(-8, 9), -128, 127, -1024, 1023):
+        lines = []
+        for start in (FLASH, FLASH + 2, FLASH + 4):
+            lines.append(_shown(_code(0xBF00, 0xE000 | halfwords & 0x7FF), start))
+            lines.append(_shown(_code(0xBF08, 0xE000 | halfwords & 0x7FF), start))
+            lines.append(_shown(_code(0xD000 | halfwords & 0xFF), start))
+            lines.append(_shown(_code(0xB100 | (halfwords & 0x1F) << 3 | (halfwords & 0x20) << 4), start))
+            sign, low = halfwords < 0, halfwords & 0x7FF
+            for j1, j2 in ((0, 0), (1, 1), (1, 0), (0, 1)):
+                joined = sign << 26 | (low >> 3 & 0x3FF) << 16 | j1 << 13 | j2 << 11 | low
+                lines += [_shown(_code(opcode | joined), start) for opcode in (0xF000_9000, 0xF000_D000)]
+                joined = sign << 26 | (low & 0x3F) << 16 | j1 << 13 | j2 << 11 | low
+                lines.append(_shown(_code(0xF000_8000 | joined), start))
+        yield "\n".join(lines)
+
+
 def _blocks(_: random.Random) -> Iterator[str]:
     dice = random.Random("blocks")
     for _number in range(BLOCKS):
@@ -176,5 +194,5 @@ def _stores(_: random.Random) -> Iterator[str]:
         yield f"{code.hex()} {bits:x} { ({f'{place:x}': f'{value:x}' for place, value in seen.items()}) } {others}"
 
 
-TRACES = {"encodings": _encodings, "blocks": _blocks, "stores": _stores}
+TRACES = {"encodings": _encodings, "branches": _branches, "blocks": _blocks, "stores": _stores}
 test_a_walk_shows_what_was_approved = judge_of(__file__, TRACES)

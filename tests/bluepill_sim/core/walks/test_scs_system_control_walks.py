@@ -31,6 +31,7 @@ _OWN = {"sram", "flash", "scratch", "fault", "last", "logged", "exact_stops", "i
 _AIRCR, _DEMCR, _LAR, _TCR, _TER, _STIR = 0xE000_ED0C, 0xE000_EDFC, 0xE000_0FB0, 0xE000_0E80, 0xE000_0E00, 0xE000_EF00
 #: Written now and then, since much hangs on them.
 _KEYS = (
+    (_TCR, 0), (_TER, 0), (_TER, 2), (0xE000_0004, 3), (0xE000_0008, 4),
     (0xE000_0000, 0x1234_5678), (0xE000_0004, 0xFFFF_FFFF), (0xE000_007C, 1),
     (_LAR, 0xC5AC_CE55), (_LAR, 1), (_DEMCR, 0x0107_0000), (_DEMCR, 0), (_AIRCR, 0x05FA_0300),
     (_AIRCR, 0x05FA_0702), (_AIRCR, 0x05FA_0000), (_AIRCR, 0x1234_0700), (_TCR, 1), (_TER, 0xFFFF_FFFF),
