@@ -117,7 +117,8 @@ def _instruction(dice: random.Random) -> int:  # noqa: C901, PLR0911 - one retur
         case 3 | 4 | 5:
             return 0x4000 | dice.choice((0, 1, 2, 3, 4, 8, 10, 11, 12, 12, 14, 14, 15)) << 6 | first << 3 | target
         case 6:
-            return 0x4600 | first << 3 | target | dice.choice((0, 0, 0x80, 0x40))
+            moved = 0x4600 | first << 3 | target | dice.choice((0, 0, 0x80, 0x40))
+            return dice.choice((moved, moved, moved, 0xE7FF))  # the last that is narrow
         case 7:
             return dice.choice((0x4800, 0x9800, 0x9000)) | target << 8 | dice.randrange(4)
         case 8:
