@@ -24,11 +24,9 @@ enum {
     SCB_SHCSR = 0xE000ED24, SCB_CFSR = 0xE000ED28, SCB_HFSR = 0xE000ED2C, DEMCR = 0xE000EDFC, STIR = 0xE000EF00
 };
 /* What a debugger has on the chip, and firmware as well. */
-enum {
-    ITM_STIM = 0xE0000000, ITM_STIM_END = 0xE0000080, ITM_LAR = 0xE0000FB0, ITM_LSR = 0xE0000FB4, ITM_END = 0xE0001000,
-    DWT_FUNCTION0 = 0xE0001028, DWT_END = 0xE0002000, FP_CTRL = 0xE0002000, FP_REMAP = 0xE0002004, FPB_END = 0xE0003000,
-    TPIU = 0xE0040000, TPIU_END = 0xE0041000
-};
+enum { ITM_LAR = 0xE0000FB0, ITM_LSR = 0xE0000FB4, FP_CTRL = 0xE0002000, FP_REMAP = 0xE0002004 };
+/* Each on a page of its own. */
+enum { ITM = 0xE0000, DWT = 0xE0001, FPB = 0xE0002, TPIU = 0xE0040 };
 #define ITM_KEY 0xC5ACCE55u
 enum { ITMENA = 1, FP_KEY = 2, FP_ENABLE = 1, FP_NUMBERS = 2 << 8 | 6 << 4, FP_IN_SRAM = 1 << 29 };
 #define MATCHED (1u << 24)
@@ -123,16 +121,25 @@ static const struct storing *found_in(const struct storing *rows, size_t count, 
     return NULL;
 }
 
-static bool is_trace(uint32_t address) { return address < ITM_END || address - TPIU < TPIU_END - TPIU; }
+static uint32_t page_of(uint32_t address) { return address >> 12; }
 
-static bool is_stimulus(uint32_t address) { return address < ITM_STIM_END; }
+static bool is_trace(uint32_t address) { return page_of(address) == ITM || page_of(address) == TPIU; }
+
+/* The ITM's ports: the first 128 bytes of it. */
+static bool is_stimulus(uint32_t address) { return address >> 7 == ITM << 5; }
+static uint32_t port_of(uint32_t address) { return address >> 2 & 31; }
+
+static bool is_systick(uint32_t address) { return address >> 4 == STK_CTRL >> 4; }
 
 /* What changes which instructions and accesses are looked out for. */
-static bool is_look_out(uint32_t address) { return address - 0xE0001020u < FPB_END - 0xE0001020u || address == DEMCR; }
+static bool is_look_out(uint32_t address)
+{
+    return (page_of(address) == DWT && address >> 5 != DWT << 7) || page_of(address) == FPB || address == DEMCR;
+}
 
 static const struct storing *storing_at(uint32_t address)
 {
-    return address < FPB_END || address - TPIU < TPIU_END - TPIU
+    return page_of(address) <= FPB || page_of(address) == TPIU
                ? found_in(of_debug, sizeof of_debug / sizeof *of_debug, address)
                : found_in(storing, sizeof storing / sizeof *storing, address);
 }
@@ -266,7 +273,7 @@ bool system_has(uint32_t address)
 {
     return is_stimulus(address) || address == ITM_LAR || address == ITM_LSR || address == FP_CTRL || address == FP_REMAP ||
            storing_at(address) != NULL || address == DWT_CTRL || address == DWT_CYCCNT ||
-           address - STK_CTRL <= STK_CALIB - STK_CTRL || is_line_array(address) || priorities_at(address) ||
+           is_systick(address) || is_line_array(address) || priorities_at(address) ||
            is_beyond_priorities(address) || address == SCB_ICSR || address == SCB_AIRCR || address == SCB_SHCSR;
 }
 
@@ -275,7 +282,7 @@ uint32_t system_read(struct shared *s, uint32_t address, uint64_t now, uint32_t 
 {
     uint32_t answer = SYSTEM_KNOWN;
     *word = 0;
-    if (address - STK_CTRL <= STK_CALIB - STK_CTRL) {
+    if (is_systick(address)) {
         answer |= system_needs_time(address) && systick_advance(s, now) ? SYSTEM_TICKED : 0;
         *word = systick_read(s, (address - STK_CTRL) >> 2, now);
         return answer;
@@ -293,7 +300,7 @@ uint32_t system_read(struct shared *s, uint32_t address, uint64_t now, uint32_t 
         return answer;
     }
     if (is_stimulus(address)) { /* chosen: there is always room for the next one */
-        *word = s->itm_control & ITMENA && s->itm_enables >> ((address - ITM_STIM) >> 2) & 1;
+        *word = s->itm_control & ITMENA && s->itm_enables >> port_of(address) & 1;
         return answer;
     }
     switch (address) {
@@ -315,7 +322,7 @@ uint32_t system_read(struct shared *s, uint32_t address, uint64_t now, uint32_t 
     *word = row->fixed | (row->field ? *field_of(s, row) : 0);
     if (address == DEMCR) {
         *word |= s->pending[0] & bit_of(DEBUG_MONITOR) ? MON_PEND : 0;
-    } else if (address - DWT_FUNCTION0 < DWT_END - DWT_FUNCTION0 && row->field >= AT(dwt_function)) {
+    } else if (row->field - AT(dwt_function) < sizeof s->dwt_function) {
         *field_of(s, row) &= ~MATCHED;
     }
     return answer;
@@ -338,7 +345,7 @@ uint32_t system_write(struct shared *s, uint32_t address, uint32_t value, uint32
         answer |= system_read(s, address, now, &before) & SYSTEM_TICKED;
         value |= before & ~mask;
     }
-    if (address - STK_CTRL <= STK_CALIB - STK_CTRL) {
+    if (is_systick(address)) {
         if (address == STK_CALIB) {
             return SYSTEM_KNOWN;
         }
@@ -363,8 +370,7 @@ uint32_t system_write(struct shared *s, uint32_t address, uint32_t value, uint32
         return SYSTEM_KNOWN;
     }
     if (is_stimulus(address)) {
-        const uint32_t port = (address - ITM_STIM) >> 2;
-        return s->itm_control & ITMENA && s->itm_enables >> port & 1 ? SYSTEM_KNOWN | SYSTEM_STIMULUS : SYSTEM_KNOWN;
+        return s->itm_control & ITMENA && s->itm_enables >> port_of(address) & 1 ? SYSTEM_KNOWN | SYSTEM_STIMULUS : SYSTEM_KNOWN;
     }
     if (is_look_out(address) || (s->dwt_function[0] && (address == DWT_CTRL || address == DWT_CYCCNT))) {
         answer |= SYSTEM_LOOK_OUT;
