@@ -40,11 +40,11 @@ TESTS_OF_C = {
         *(f"tests/bluepill_sim/native/test_native_{name}.py" for name in ("system", "core", "polling", "ambiguous")),
         "tests/bluepill_sim/peripherals/walks/test_adc_dma_walks.py",
         "tests/bluepill_sim/core/interpreter/test_exact.py", "tests/bluepill_sim/core", "tests/bluepill_sim/native"),
-    "bluepill_sim/extension/source/fabric": (*(f"tests/bluepill_sim/peripherals/walks/test_{name}_walks.py"
-                                               for name in ("tim", "spi_i2c", "usart", "adc_dma")),
-                                             "tests/bluepill_sim/fabric", "tests/bluepill_sim/test_timers.py",
-                                             "tests/bluepill_sim/peripherals/tim/test_tim.py",
-                                             "tests/bluepill_sim/core/test_core_parts.py", "tests/bluepill_sim/native"),
+    "bluepill_sim/extension/source/fabric": (
+        "tests/bluepill_sim/fabric",
+        *(f"tests/bluepill_sim/peripherals/walks/test_{name}_walks.py" for name in ("tim", "spi_i2c")),
+        "tests/bluepill_sim/test_timers.py", "tests/bluepill_sim/peripherals/tim/test_tim.py",
+        "tests/bluepill_sim/core/test_core_parts.py", "tests/bluepill_sim/native"),
     "bluepill_sim/extension/source": ("tests/bluepill_sim/fabric", "tests/bluepill_sim/native", "tests/bluepill_sim"),
     "robot_bench/wires": ("tests/robot_bench/wires",),
     "adapter_fw/core/app": ("tests/adapter_fw/test_units.py", "tests/adapter_fw/test_shell.py"),
