@@ -38,8 +38,8 @@ TESTS_OF_C = {
         *(f"tests/bluepill_sim/core/test_{name}.py"
           for name in ("exceptions", "faults", "imprecise_faults", "late_arrival", "masks", "stacks", "time", "traps")),
         *(f"tests/bluepill_sim/native/test_native_{name}.py" for name in ("system", "core", "polling", "ambiguous")),
-        "tests/bluepill_sim/peripherals/walks/test_adc_dma_walks.py",
-        "tests/bluepill_sim/core/interpreter/test_exact.py", "tests/bluepill_sim/core", "tests/bluepill_sim/native"),
+        "tests/bluepill_sim/core/interpreter/test_exact.py", "tests/bluepill_sim/core", "tests/bluepill_sim/native",
+        "tests/bluepill_sim/peripherals/walks/test_adc_dma_walks.py"),
     "bluepill_sim/extension/source/fabric": (
         "tests/bluepill_sim/fabric",
         *(f"tests/bluepill_sim/peripherals/walks/test_{name}_walks.py" for name in ("tim", "spi_i2c")),
