@@ -22,7 +22,7 @@ from tests.bluepill_sim.machine import COUNTER_ON, FLASH, STACK, Assembler
 ROOM, CODE_AT, EXCEPTIONS = 0x880, 0x140, 76
 #: SRAM: what handlers note, a copy of the vectors, code, the process stack.
 NOTES, VECTORS, CODE, PROCESS_STACK = 0x2000_0100, 0x2000_2000, 0x2000_3000, 0x2000_4000
-_PIECES = 16
+_PIECES = 15
 
 #: System registers that a program writes, and which bits of a random word.
 _SYSTEM = (
@@ -137,6 +137,7 @@ class ProgramWriter:
     def written(self) -> str:
         """Return the whole program: set up, pieces, handlers."""
         pieces = "".join(self._guarded(self._dice.choice(self._kinds)()) for _ in range(_PIECES))
+        pieces += self._guarded(self._dice.choice((str, str, self.bad_stack))())
         other = self._dice.choice((str, self.request, self.masks, self.system, self.bits, self.peripheral))()
         return (
             f"start: mov32 r7, #{SCRATCH + 0x140}\n"
@@ -489,6 +490,20 @@ class ProgramWriter:
         """Take an exception on a stack that is no multiple of 8."""
         align = f"mov32 r1, #0xE000ED14\nmov32 r0, #{self._dice.choice((0, 0x200, 0x218))}\nstr r0, [r1, #0]\n"
         return f"{align}.half 0xB081\n{self._dice.choice(('svc #3', self.request(), 'nop'))}\nnop\n.half 0xB001\n"
+
+    def bad_stack(self) -> str:
+        """Take an exception where its frame cannot be stacked: the last that a program does."""
+        place = self._dice.choice((0x2000_0010, 0x2000_5014, 0x6000_0000, 0x0800_0100))
+        stack = self._dice.choice(("msr msp, r0\n", "msr psp, r0\nmovs r0, #2\nmsr control, r0\nisb\n"))
+        trigger = self._dice.choice(
+            (
+                "svc #1\n",
+                "udf\n",
+                "mov32 r2, #0x80000000\nstr r2, [r1, #0]\n",
+                "mov32 r2, #0x10000000\nstr r2, [r1, #0]\n",
+            )
+        )
+        return f"mov32 r1, #0xE000ED04\nmov32 r0, #{place}\n{stack}{trigger}nop\nnop\n"
 
     def tick(self) -> str:
         """Start SysTick, with or without its interrupt."""

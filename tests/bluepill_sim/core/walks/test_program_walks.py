@@ -32,7 +32,7 @@ _NVIC = ("pending", "active", "enabled", "levels", "priority_grouping")
 
 @cache
 def _image() -> tuple[Image, list[tuple[int, int]]]:
-    return assembled(PROGRAMS, "ai")
+    return assembled(PROGRAMS, "bg")
 
 
 def _board(core: str) -> BluePill:
