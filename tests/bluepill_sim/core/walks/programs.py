@@ -89,6 +89,7 @@ str r2, [r1, #0]
 _FAULT = f"""{_NOTE}mov32 r1, #0xE000ED28
 ldr r0, [r1, #0]
 str r0, [r1, #0]
+adds r6, r6, r0
 mov32 r3, #4
 mov r0, lr
 .half 0x4218
@@ -134,9 +135,13 @@ class ProgramWriter:
             self.flash_write, self.narrow,
         )  # fmt: skip
 
-    def written(self) -> str:
-        """Return the whole program: set up, pieces, handlers."""
-        pieces = "".join(self._guarded(self._dice.choice(self._kinds)()) for _ in range(_PIECES))
+    def written(self, *, has_all_faults: bool = False) -> str:
+        """Return the whole program: set up, pieces or each fault once, handlers."""
+        pieces = (
+            "".join(map(self._guarded, (f"{each}\n" for each in _FAULTS)))
+            if has_all_faults
+            else "".join(self._guarded(self._dice.choice(self._kinds)()) for _ in range(_PIECES))
+        )
         pieces += self._guarded(self._dice.choice((str, str, self.bad_stack))())
         other = self._dice.choice((str, self.request, self.masks, self.system, self.bits, self.peripheral))()
         return (
@@ -549,7 +554,8 @@ def assembled(programs: int, seed: str) -> tuple[Image, list[tuple[int, int]]]:
     data, places = bytearray(), []
     for number in range(programs):
         base = FLASH + ROOM * number
-        made = Assembler(ProgramWriter(random.Random(f"{seed} {number}")).written(), base + CODE_AT)
+        writer = ProgramWriter(random.Random(f"{seed} {number}"))
+        made = Assembler(writer.written(has_all_faults=number == 0), base + CODE_AT)
         label = made.labels
         table = [STACK, label["start"] | 1] + [label["irq"] | 1] * (EXCEPTIONS - 2)
         for exception, name in (

@@ -95,7 +95,7 @@ def _lines(board: BluePill, number: int, base: int, stop: int, *, is_exact: bool
     for turn in range(SLICES):
         board.pin("PA0").drive(bool(turn % 2))
         if dice.random() < 0.15:
-            _request(board, dice.choice((1, 5, 47, 48, 59)), stays=dice.random() < 0.1)
+            _request(board, dice.choice((1, 5, 47, 48, 59)), stays=number > 0 and dice.random() < 0.1)
         if turn == SLICES // 3:
             saved = board.snapshot()
             board.advance_to(board.now_ns + 2_000)
