@@ -50,7 +50,7 @@ VECTOR_COUNT = FIRST_IRQ + len(IRQ_NAMES)
 #: Priority of thread mode: lower than that of every exception.
 THREAD_PRIORITY = 256
 #: Priorities that cannot be set.
-FIXED_PRIORITIES = {1: -3, NMI: -2, HARD_FAULT: -1}
+FIXED_PRIORITIES = {NMI: -2, HARD_FAULT: -1}
 
 SYSTEM_EXCEPTIONS = (1 << FIRST_IRQ) - 1
 

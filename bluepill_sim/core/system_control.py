@@ -97,8 +97,10 @@ class SystemControl(Stateful):
 
     def read(self, offset: int, size: int) -> int:
         """Return what the core reads; `offset` counts from PPB_BASE."""
-        address = PPB_BASE + (offset & ~3)
-        answer = library().system_read(self._at, address, self._chip.access_cycle, ctypes.addressof(self._word))
+        address, cycle = PPB_BASE + (offset & ~3), self._chip.access_cycle
+        if address == _CYCCNT:  # as of SysTick's own registers
+            self._core.systick.advance_to(cycle)
+        answer = library().system_read(self._at, address, cycle, ctypes.addressof(self._word))
         if not answer:
             self._warn(address)
         self._act_on(answer)
@@ -107,8 +109,10 @@ class SystemControl(Stateful):
     def write(self, offset: int, size: int, value: int) -> bool:
         """Take what the core writes; return whether it is modelled."""
         address, shift = PPB_BASE + (offset & ~3), 8 * (offset & 3)
-        mask = ((1 << 8 * size) - 1) << shift
-        answer = library().system_write(self._at, address, value << shift & mask, mask, self._chip.access_cycle)
+        mask, cycle = ((1 << 8 * size) - 1) << shift, self._chip.access_cycle
+        if self.is_modelled(offset) or address == _STIR:  # what is made pending here comes behind a tick before it
+            self._core.systick.advance_to(cycle)
+        answer = library().system_write(self._at, address, value << shift & mask, mask, cycle)
         if not answer:
             self._warn(address)
         self._act_on(answer)

@@ -20,20 +20,31 @@ UNKNOWN_S, LEAST_S = 1.0, 0.2
 SELDOM = 1.5
 #: A word in the names of files of tests that hold all that a module does at once: they are asked first.
 WHOLE = "walks"
-#: What tests a library in C or C++, by the folder of its sources: there are no imports to read.
+#: What tests a library in C or C++, by the folder of its sources or by a file: there are no imports to read.
 TESTS_OF_C = {
+    # What is made of declarations is held to them as text.
+    **dict.fromkeys(
+        ("bluepill_sim/extension/source/registers", "bluepill_sim/extension/source/fabric/layout.h",
+         "bluepill_sim/extension/source/interpreter/encodings.h"),
+        ("tests/bluepill_sim/fabric/test_descriptions.py",)),
     "bluepill_sim/extension/source/devices": ("tests/bluepill_sim/peripherals", "tests/bluepill_sim/native"),
-    "bluepill_sim/extension/source/registers": ("tests/bluepill_sim/peripherals", "tests/bluepill_sim/native"),
     "bluepill_sim/extension/source/interpreter": (
         *(f"tests/bluepill_sim/core/interpreter/test_{name}.py"
           for name in ("tidy", "memory_bounds", "against_unicorn", "blocks_decode", "special", "own_core", "exact")),
         "tests/bluepill_sim/core/interpreter", "tests/bluepill_sim/core/test_kernels.py",
         "tests/bluepill_sim/core/test_flag_vectors.py", "tests/bluepill_sim/native/test_native_core.py",
         "tests/bluepill_sim/core", "tests/bluepill_sim/native"),
-    "bluepill_sim/extension/source/core": ("tests/bluepill_sim/core", "tests/bluepill_sim/native"),
-    "bluepill_sim/extension/source/fabric": ("tests/bluepill_sim/fabric", "tests/bluepill_sim/test_timers.py",
-                                             "tests/bluepill_sim/peripherals/tim/test_tim.py",
-                                             "tests/bluepill_sim/core/test_core_parts.py", "tests/bluepill_sim/native"),
+    "bluepill_sim/extension/source/core": (
+        *(f"tests/bluepill_sim/core/test_{name}.py"
+          for name in ("exceptions", "faults", "imprecise_faults", "late_arrival", "masks", "stacks", "time", "traps")),
+        *(f"tests/bluepill_sim/native/test_native_{name}.py" for name in ("system", "core", "polling", "ambiguous")),
+        "tests/bluepill_sim/core/interpreter/test_exact.py", "tests/bluepill_sim/core", "tests/bluepill_sim/native",
+        "tests/bluepill_sim/peripherals/walks/test_adc_dma_walks.py"),
+    "bluepill_sim/extension/source/fabric": (
+        "tests/bluepill_sim/fabric",
+        *(f"tests/bluepill_sim/peripherals/walks/test_{name}_walks.py" for name in ("tim", "spi_i2c")),
+        "tests/bluepill_sim/test_timers.py", "tests/bluepill_sim/peripherals/tim/test_tim.py",
+        "tests/bluepill_sim/core/test_core_parts.py", "tests/bluepill_sim/native"),
     "bluepill_sim/extension/source": ("tests/bluepill_sim/fabric", "tests/bluepill_sim/native", "tests/bluepill_sim"),
     "robot_bench/wires": ("tests/robot_bench/wires",),
     "adapter_fw/core/app": ("tests/adapter_fw/test_units.py", "tests/adapter_fw/test_shell.py"),
@@ -141,7 +152,7 @@ class Nearest:
         return frozenset(found)
 
     def _of_c(self, path: str) -> tuple[str, ...]:
-        folders = next((tests for folder, tests in TESTS_OF_C.items() if path.startswith(f"{folder}/")), ())
+        folders = next((tests for place, tests in TESTS_OF_C.items() if f"{path}/".startswith(f"{place}/")), ())
         stem = {*Path(path).stem.split("_")}
         order = {
             name: (not stem & _words(name), WHOLE not in _words(name), place)

@@ -24,7 +24,7 @@ struct region_user {
 /* An unaligned access is made in at most so many. */
 enum { PARTS = 16 };
 
-enum { DWT_CTRL = 0xE0001000, DWT_CYCCNT = 0xE0001004, SCS = 0xE000E000, DEMCR = 0xE000EDFC, STK_CTRL = 0xE000E010, SCB_AIRCR = 0xE000ED0C, SCB_CCR = 0xE000ED14, STIR = 0xE000EF00 };
+enum { SCS = 0xE000E000, DEMCR = 0xE000EDFC, STK_CTRL = 0xE000E010, SCB_AIRCR = 0xE000ED0C, SCB_CCR = 0xE000ED14, STIR = 0xE000EF00 };
 #define IN_PAGE ((1u << PAGE_SHIFT) - 1)
 
 /* What Unicorn hands back at each access of a region; it is freed with the core. */
@@ -502,7 +502,7 @@ static bool write_system(struct core *core, uint32_t address, uint32_t size, uin
     const uint32_t mask = (size == 4 ? UINT32_MAX : (1u << 8 * size) - 1) << 8 * (address & 3);
     const bool is_systick = at - STK_CTRL <= 8;
     if (!may_access(core) || !is_privileged(core) || at == SCB_AIRCR || at == SCB_CCR ||
-        (at < SCS && ((at != DWT_CTRL && at != DWT_CYCCNT) || s->dwt_function[0])) || at == DEMCR ||
+        at < SCS || at == DEMCR ||
         !(system_has(at) || at == STIR) ||
         (is_systick && s->hears_ticks)) {
         return false;
@@ -699,7 +699,7 @@ static uint64_t read_io(const struct region_user *region, uint64_t at, unsigned 
     } else {
         return ask_read(region, offset, size);
     }
-    return size == 4 ? word : (word >> (offset & 3) * 8) & ((1u << size * 8) - 1);
+    return word >> (offset & 3) * 8; /* the core takes as many bits as it has asked for */
 }
 
 uint64_t core_read_io(void *unicorn, uint64_t at, unsigned size, void *user)

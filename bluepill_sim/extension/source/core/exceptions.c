@@ -30,7 +30,7 @@ uint64_t deliverable(const struct shared *s, uint64_t *high)
 
 static int priority_of(const struct shared *s, unsigned number)
 {
-    return number == 1 ? -3 : number == NMI ? -2 : number == HARD_FAULT ? -1 : s->priorities[number];
+    return number == NMI ? -2 : number == HARD_FAULT ? -1 : s->priorities[number];
 }
 
 static int group(const struct shared *s, int priority)

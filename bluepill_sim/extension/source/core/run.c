@@ -32,7 +32,6 @@ struct core *core_new(void *unicorn, const struct unicorn_api *api, const struct
         core->none.start = core->none.end = UINT32_MAX;
         core->none.ways = &core->ways[FLASH_SLOTS];
         core->block = &core->none;
-        core->paged_region = core->bits_region = core->sram_bits_region = core->system_region = UINT32_MAX;
         core->waiting.interval = LEAST_INTERVAL;
         system_init(&core->shared);
     }

@@ -24,11 +24,9 @@ enum {
     SCB_SHCSR = 0xE000ED24, SCB_CFSR = 0xE000ED28, SCB_HFSR = 0xE000ED2C, DEMCR = 0xE000EDFC, STIR = 0xE000EF00
 };
 /* What a debugger has on the chip, and firmware as well. */
-enum {
-    ITM_STIM = 0xE0000000, ITM_STIM_END = 0xE0000080, ITM_LAR = 0xE0000FB0, ITM_LSR = 0xE0000FB4, ITM_END = 0xE0001000,
-    DWT_FUNCTION0 = 0xE0001028, DWT_END = 0xE0002000, FP_CTRL = 0xE0002000, FP_REMAP = 0xE0002004, FPB_END = 0xE0003000,
-    TPIU = 0xE0040000, TPIU_END = 0xE0041000
-};
+enum { ITM_LAR = 0xE0000FB0, ITM_LSR = 0xE0000FB4, FP_CTRL = 0xE0002000, FP_REMAP = 0xE0002004 };
+/* Each on a page of its own. */
+enum { ITM = 0xE0000, DWT = 0xE0001, FPB = 0xE0002, TPIU = 0xE0040 };
 #define ITM_KEY 0xC5ACCE55u
 enum { ITMENA = 1, FP_KEY = 2, FP_ENABLE = 1, FP_NUMBERS = 2 << 8 | 6 << 4, FP_IN_SRAM = 1 << 29 };
 #define MATCHED (1u << 24)
@@ -61,61 +59,56 @@ struct storing {
 #define AT(name) offsetof(struct shared, name)
 #define WORD 0xFFFFFFFFu
 
+#define FIXED(at, word) {.address = (at), .fixed = (word), .is_read_only = true}
+#define TAKES(at, bits, place) {.address = (at), .takes = (bits), .field = (place)}
+#define CLEARS(at, place) {.address = (at), .clears = WORD, .field = (place)}
+
 static const struct storing storing[] = {
-    {0xE000E004, 1, 0, 0, 0, 1},                         /* ICTR: 33 to 64 lines */
-    {0xE000E008, 0, 7, 0, AT(actlr), 0},                 /* ACTLR: DISFOLD, DISDEFWBUF, DISMCYCINT */
-    {0xE000ED00, 0x411FC231, 0, 0, 0, 1},                /* CPUID: Cortex-M3 r1p1 (PM0056 4.4.1) */
-    {0xE000ED08, 0, 0x3FFFFF80, 0, AT(vector_table), 0}, /* VTOR (PM0056 4.4.4) */
-    {0xE000ED10, 0, 0x16, 0, AT(scr), 0},
-    {SCB_CCR, 0, 0x31B, 0, AT(ccr), 0},
-    {SCB_CFSR, 0, 0, WORD, AT(cfsr), 0},
-    {SCB_HFSR, 0, 0, WORD, AT(hfsr), 0},
-    {0xE000ED30, 0, 0, WORD, AT(dfsr), 0},
-    {0xE000ED34, 0, WORD, 0, AT(mmfar), 0},
-    {0xE000ED38, 0, WORD, 0, AT(bfar), 0},
-    {0xE000ED3C, 0, 0, 0, 0, 1}, /* AFSR */
-    {0xE000ED90, 0, 0, 0, 0, 1}, /* MPU_TYPE: no regions; its other registers ignore writes */
-    {0xE000ED94, 0, 0, 0, 0, 1},
-    {0xE000ED98, 0, 0, 0, 0, 1},
-    {0xE000ED9C, 0, 0, 0, 0, 1},
-    {0xE000EDA0, 0, 0, 0, 0, 1},
-    {0xE000EDA4, 0, 0, 0, 0, 1},
-    {0xE000EDA8, 0, 0, 0, 0, 1},
-    {0xE000EDAC, 0, 0, 0, 0, 1},
-    {0xE000EDB0, 0, 0, 0, 0, 1},
-    {0xE000EDB4, 0, 0, 0, 0, 1},
-    {0xE000EDB8, 0, 0, 0, 0, 1},
-    {0xE000EDF0, 0, 0, 0, 0, 1}, /* DHCSR: no debugger */
-    {DEMCR, 0, 0x010D07F1, 0, AT(demcr), 0},
-    {0xE0042000, 0x20036410, 0, 0, 0, 1}, /* DBGMCU_IDCODE: medium density, revision "X" (RM0008 31.6.1) */
-    {0xE0042004, 0, WORD, 0, AT(dbgmcu_cr), 0},
+    FIXED(0xE000E004, 1),                             /* ICTR: 33 to 64 lines */
+    TAKES(0xE000E008, 7, AT(actlr)),                  /* ACTLR: DISFOLD, DISDEFWBUF, DISMCYCINT */
+    FIXED(0xE000ED00, 0x411FC231),                    /* CPUID: Cortex-M3 r1p1 (PM0056 4.4.1) */
+    TAKES(0xE000ED08, 0x3FFFFF80, AT(vector_table)),  /* VTOR (PM0056 4.4.4) */
+    TAKES(0xE000ED10, 0x16, AT(scr)),
+    TAKES(SCB_CCR, 0x31B, AT(ccr)),
+    CLEARS(SCB_CFSR, AT(cfsr)),
+    CLEARS(SCB_HFSR, AT(hfsr)),
+    CLEARS(0xE000ED30, AT(dfsr)),
+    TAKES(0xE000ED34, WORD, AT(mmfar)),
+    TAKES(0xE000ED38, WORD, AT(bfar)),
+    FIXED(0xE000ED3C, 0), /* AFSR */
+    FIXED(0xE000ED90, 0), /* MPU_TYPE: no regions; its other registers ignore writes */
+    FIXED(0xE000ED94, 0), FIXED(0xE000ED98, 0), FIXED(0xE000ED9C, 0), FIXED(0xE000EDA0, 0), FIXED(0xE000EDA4, 0),
+    FIXED(0xE000EDA8, 0), FIXED(0xE000EDAC, 0), FIXED(0xE000EDB0, 0), FIXED(0xE000EDB4, 0), FIXED(0xE000EDB8, 0),
+    FIXED(0xE000EDF0, 0), /* DHCSR: no debugger */
+    TAKES(DEMCR, 0x010D07F1, AT(demcr)),
+    FIXED(0xE0042000, 0x20036410), /* DBGMCU_IDCODE: medium density, revision "X" (RM0008 31.6.1) */
+    TAKES(0xE0042004, WORD, AT(dbgmcu_cr)),
 };
 
 /* Those of ITM, DWT, FPB and TPIU. Chosen: the counters but CYCCNT only store. */
-#define COUNT(n) {0xE0001008 + 4 * (n), 0, 0xFF, 0, AT(dwt_counts) + 4 * (n), 0}
-#define COMPARATOR(n)                                                                                                  \
-    {0xE0001020 + 16 * (n), 0, WORD, 0, AT(dwt_comp) + 4 * (n), 0},                                                    \
-        {0xE0001024 + 16 * (n), 0, 0x1F, 0, AT(dwt_mask) + 4 * (n), 0},                                                \
-    {                                                                                                                  \
-        0xE0001028 + 16 * (n), 0, (n) == 0 ? 0xFFDAF : (n) == 1 ? 0xFFD2F : 0x2F, 0, AT(dwt_function) + 4 * (n), 0     \
-    }
-#define PATCH(n) {0xE0002008 + 4 * (n), 0, (n) < 6 ? 0xDFFFFFFD : 0x1FFFFFFD, 0, AT(fp_comp) + 4 * (n), 0}
+#define COUNT(n) TAKES(0xE0001008 + 4 * (n), 0xFF, AT(dwt_counts) + 4 * (n))
+#define COMPARATOR(n, function)                                                                                        \
+    TAKES(0xE0001020 + 16 * (n), WORD, AT(dwt_comp) + 4 * (n)), TAKES(0xE0001024 + 16 * (n), 0x1F, AT(dwt_mask) + 4 * (n)), \
+        TAKES(0xE0001028 + 16 * (n), function, AT(dwt_function) + 4 * (n))
+#define INSTRUCTION(n) TAKES(0xE0002008 + 4 * (n), 0xDFFFFFFD, AT(fp_comp) + 4 * (n))
+#define LITERAL(n) TAKES(0xE0002008 + 4 * (n), 0x1FFFFFFD, AT(fp_comp) + 4 * (n))
 
 static const struct storing of_debug[] = {
-    {0xE0000E00, 0, WORD, 0, AT(itm_enables), 0}, /* TER */
-    {0xE0000E40, 0, 0xF, 0, AT(itm_privileges), 0}, /* TPR */
-    {0xE0000E80, 0, 0x7F031F, 0, AT(itm_control), 0}, /* TCR */
+    TAKES(0xE0000E00, WORD, AT(itm_enables)),     /* TER */
+    TAKES(0xE0000E40, 0xF, AT(itm_privileges)),   /* TPR */
+    TAKES(0xE0000E80, 0x7F031F, AT(itm_control)), /* TCR */
     COUNT(0), COUNT(1), COUNT(2), COUNT(3), COUNT(4),
-    {0xE000101C, 0, 0, 0, 0, 1}, /* PCSR: a debugger's */
-    COMPARATOR(0), COMPARATOR(1), COMPARATOR(2), COMPARATOR(3),
-    PATCH(0), PATCH(1), PATCH(2), PATCH(3), PATCH(4), PATCH(5), PATCH(6), PATCH(7),
-    {0xE0040000, 0xB, 0, 0, 0, 1},                  /* SSPSR: 1, 2 or 4 pins */
-    {0xE0040004, 0, 0xF, 0, AT(tpiu_size), 0},      /* CSPSR */
-    {0xE0040010, 0, 0x1FFF, 0, AT(tpiu_prescaler), 0}, /* ACPR */
-    {0xE00400F0, 0, 3, 0, AT(tpiu_protocol), 0},    /* SPPR */
-    {0xE0040300, 8, 0, 0, 0, 1},                    /* FFSR: the formatter cannot be stopped */
-    {0xE0040304, 0x100, 2, 0, AT(tpiu_formatter), 0}, /* FFCR */
-    {0xE0040FC8, 0xCA1, 0, 0, 0, 1},                /* DEVID */
+    FIXED(0xE000101C, 0), /* PCSR: a debugger's */
+    COMPARATOR(0, 0xFFDAF), COMPARATOR(1, 0xFFD2F), COMPARATOR(2, 0x2F), COMPARATOR(3, 0x2F),
+    INSTRUCTION(0), INSTRUCTION(1), INSTRUCTION(2), INSTRUCTION(3), INSTRUCTION(4), INSTRUCTION(5), LITERAL(6), LITERAL(7),
+    FIXED(0xE0040000, 0xB),                        /* SSPSR: 1, 2 or 4 pins */
+    TAKES(0xE0040004, 0xF, AT(tpiu_size)),         /* CSPSR */
+    TAKES(0xE0040010, 0x1FFF, AT(tpiu_prescaler)), /* ACPR */
+    TAKES(0xE00400F0, 3, AT(tpiu_protocol)),       /* SPPR */
+    FIXED(0xE0040300, 8),                          /* FFSR: the formatter cannot be stopped */
+    /* FFCR */
+    {.address = 0xE0040304, .fixed = 0x100, .takes = 2, .field = AT(tpiu_formatter)},
+    FIXED(0xE0040FC8, 0xCA1), /* DEVID */
 };
 
 static const struct storing *found_in(const struct storing *rows, size_t count, uint32_t address)
@@ -128,16 +121,25 @@ static const struct storing *found_in(const struct storing *rows, size_t count, 
     return NULL;
 }
 
-static bool is_trace(uint32_t address) { return address < ITM_END || address - TPIU < TPIU_END - TPIU; }
+static uint32_t page_of(uint32_t address) { return address >> 12; }
 
-static bool is_stimulus(uint32_t address) { return address < ITM_STIM_END; }
+static bool is_trace(uint32_t address) { return page_of(address) == ITM || page_of(address) == TPIU; }
+
+/* The ITM's ports: the first 128 bytes of it. */
+static bool is_stimulus(uint32_t address) { return address >> 7 == ITM << 5; }
+static uint32_t port_of(uint32_t address) { return address >> 2 & 31; }
+
+static bool is_systick(uint32_t address) { return address >> 4 == STK_CTRL >> 4; }
 
 /* What changes which instructions and accesses are looked out for. */
-static bool is_look_out(uint32_t address) { return address - 0xE0001020u < FPB_END - 0xE0001020u || address == DEMCR; }
+static bool is_look_out(uint32_t address)
+{
+    return (page_of(address) == DWT && address >> 5 != DWT << 7) || page_of(address) == FPB || address == DEMCR;
+}
 
 static const struct storing *storing_at(uint32_t address)
 {
-    return address < FPB_END || address - TPIU < TPIU_END - TPIU
+    return page_of(address) <= FPB || page_of(address) == TPIU
                ? found_in(of_debug, sizeof of_debug / sizeof *of_debug, address)
                : found_in(storing, sizeof storing / sizeof *storing, address);
 }
@@ -271,7 +273,7 @@ bool system_has(uint32_t address)
 {
     return is_stimulus(address) || address == ITM_LAR || address == ITM_LSR || address == FP_CTRL || address == FP_REMAP ||
            storing_at(address) != NULL || address == DWT_CTRL || address == DWT_CYCCNT ||
-           address - STK_CTRL <= STK_CALIB - STK_CTRL || is_line_array(address) || priorities_at(address) ||
+           is_systick(address) || is_line_array(address) || priorities_at(address) ||
            is_beyond_priorities(address) || address == SCB_ICSR || address == SCB_AIRCR || address == SCB_SHCSR;
 }
 
@@ -280,8 +282,8 @@ uint32_t system_read(struct shared *s, uint32_t address, uint64_t now, uint32_t 
 {
     uint32_t answer = SYSTEM_KNOWN;
     *word = 0;
-    if (address - STK_CTRL <= STK_CALIB - STK_CTRL) {
-        answer |= systick_advance(s, now) ? SYSTEM_TICKED : 0;
+    if (is_systick(address)) {
+        answer |= system_needs_time(address) && systick_advance(s, now) ? SYSTEM_TICKED : 0;
         *word = systick_read(s, (address - STK_CTRL) >> 2, now);
         return answer;
     }
@@ -298,7 +300,7 @@ uint32_t system_read(struct shared *s, uint32_t address, uint64_t now, uint32_t 
         return answer;
     }
     if (is_stimulus(address)) { /* chosen: there is always room for the next one */
-        *word = s->itm_control & ITMENA && s->itm_enables >> ((address - ITM_STIM) >> 2) & 1;
+        *word = s->itm_control & ITMENA && s->itm_enables >> port_of(address) & 1;
         return answer;
     }
     switch (address) {
@@ -320,7 +322,7 @@ uint32_t system_read(struct shared *s, uint32_t address, uint64_t now, uint32_t 
     *word = row->fixed | (row->field ? *field_of(s, row) : 0);
     if (address == DEMCR) {
         *word |= s->pending[0] & bit_of(DEBUG_MONITOR) ? MON_PEND : 0;
-    } else if (address - DWT_FUNCTION0 < DWT_END - DWT_FUNCTION0 && row->field >= AT(dwt_function)) {
+    } else if (row->field - AT(dwt_function) < sizeof s->dwt_function) {
         *field_of(s, row) &= ~MATCHED;
     }
     return answer;
@@ -343,7 +345,7 @@ uint32_t system_write(struct shared *s, uint32_t address, uint32_t value, uint32
         answer |= system_read(s, address, now, &before) & SYSTEM_TICKED;
         value |= before & ~mask;
     }
-    if (address - STK_CTRL <= STK_CALIB - STK_CTRL) {
+    if (is_systick(address)) {
         if (address == STK_CALIB) {
             return SYSTEM_KNOWN;
         }
@@ -368,8 +370,7 @@ uint32_t system_write(struct shared *s, uint32_t address, uint32_t value, uint32
         return SYSTEM_KNOWN;
     }
     if (is_stimulus(address)) {
-        const uint32_t port = (address - ITM_STIM) >> 2;
-        return s->itm_control & ITMENA && s->itm_enables >> port & 1 ? SYSTEM_KNOWN | SYSTEM_STIMULUS : SYSTEM_KNOWN;
+        return s->itm_control & ITMENA && s->itm_enables >> port_of(address) & 1 ? SYSTEM_KNOWN | SYSTEM_STIMULUS : SYSTEM_KNOWN;
     }
     if (is_look_out(address) || (s->dwt_function[0] && (address == DWT_CTRL || address == DWT_CYCCNT))) {
         answer |= SYSTEM_LOOK_OUT;
