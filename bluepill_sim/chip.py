@@ -56,8 +56,10 @@ from bluepill_sim.stm32f103 import (
     SRAM_BYTES,
     SYSTEM_MEMORY_BASE,
     WAKING_IRQS,
+    is_in_sram,
     make_parts,
     make_pins,
+    without_alias,
 )
 from simbase.state import Stateful
 from simbase.timing import Nanos, Reason
@@ -596,7 +598,7 @@ class Chip(Stateful):
     def _measure(self, address: int, size: int) -> BasicBlock:
         """Return the costs of a block at the present flash settings."""
         code = self.engine.flash_patch.fetched(address, self.memory.read(address, size) or b"")
-        is_sram = SRAM_BASE <= address < SRAM_BASE + SRAM_BYTES
+        is_sram = is_in_sram(address)
         wait_states, has_prefetch = (0, True) if is_sram else self._flash_access
         return measure_block(code, address, wait_states, has_prefetch=has_prefetch)
 
@@ -655,7 +657,7 @@ class Chip(Stateful):
                 return False
             self._flash_repairs.append((OPTION_BYTES_BASE, self.memory.options))
             return True
-        offset = address - FLASH_BASE if address >= FLASH_BASE else address
+        offset = without_alias(address) - FLASH_BASE
         if not 0 <= offset <= FLASH_BYTES_FITTED - size:
             return False
         if not self.parts.flash.program(offset, size, value):
@@ -666,7 +668,7 @@ class Chip(Stateful):
 
     def _program_at_once(self, address: int, size: int, pc: int, cycle: int, stop_at: int) -> int | None:
         """Program a halfword for code in flash, which waits for it, where nothing else is due before it ends."""
-        offset = address - FLASH_BASE if address >= FLASH_BASE else address
+        offset = without_alias(address) - FLASH_BASE
         if (
             size != _FLASH_WRITE_BYTES
             or offset % size

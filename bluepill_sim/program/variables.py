@@ -22,7 +22,7 @@ from typing import Any, TypeAlias
 from bluepill_sim.errors import ImageError
 from bluepill_sim.program.elf_file import file_bytes
 from bluepill_sim.program.image import ELF_MAGIC, Image, SymbolTable
-from bluepill_sim.stm32f103 import SRAM_BASE, SRAM_BYTES
+from bluepill_sim.stm32f103 import SRAM_BYTES, is_in_sram
 from simbase.errors import MissingDependencyError, UsageError, nearest, shown
 
 _OP_ADDR, _OP_PLUS_UCONST = 0x03, 0x23
@@ -179,12 +179,12 @@ class VariableTable:
         """Return names of numbers in SRAM that begin so, or else that have it in them, in the order of names."""
         begun = begun.strip()
         names = [leaf for root, (address, found) in sorted(self.roots.items())
-                 if SRAM_BASE <= address < SRAM_BASE + SRAM_BYTES and (root.startswith(begun) or begun.startswith(root))
+                 if is_in_sram(address) and (root.startswith(begun) or begun.startswith(root))
                  for leaf in islice((one.name for one in _leaves(root, address, found)), SRAM_BYTES)
                  if leaf.startswith(begun)]  # fmt: skip
         if not names:
             names = [leaf.name for root, (address, found) in sorted(self.roots.items())
-                     if SRAM_BASE <= address < SRAM_BASE + SRAM_BYTES
+                     if is_in_sram(address)
                      for leaf in islice(_leaves(root, address, found), SRAM_BYTES)
                      if begun.lower() in leaf.name.lower()]  # fmt: skip
         return names[:most]
