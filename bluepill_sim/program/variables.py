@@ -169,17 +169,18 @@ class VariableTable:
 
     def _with_scope(self, begun: str, name: str) -> tuple[str, str]:
         """Return a name with what stands before it, where one function, file or namespace alone has it."""
-        if begun and begun not in self.roots and begun not in self.ambiguous:
+        if begun not in self.roots and begun not in self.ambiguous:
             inner = [root for root in self.roots if root.endswith(f"::{begun}")]
-            if len(inner) == 1:
-                return inner[0], inner[0] + name[len(begun) :]
+            match inner:
+                case [whole]:
+                    return whole, whole + name.removeprefix(begun)
         return begun, name
 
     def offered(self, begun: str, most: int = MOST_OFFERED) -> list[str]:
         """Return names of numbers in SRAM that begin so, or else that have it in them, in the order of names."""
         begun = begun.strip()
         names = [leaf for root, (address, found) in sorted(self.roots.items())
-                 if is_in_sram(address) and (root.startswith(begun) or begun.startswith(root))
+                 if is_in_sram(address)
                  for leaf in islice((one.name for one in _leaves(root, address, found)), SRAM_BYTES)
                  if leaf.startswith(begun)]  # fmt: skip
         if not names:

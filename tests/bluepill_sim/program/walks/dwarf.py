@@ -58,9 +58,14 @@ class FakeElf:
     """What `ELFFile` would be of a file with these compilation units."""
 
     units: tuple[Die, ...]
+    #: The line program of each of them.
+    program: object = None
 
     def has_dwarf_info(self) -> bool:
         return bool(self.units)
+
+    def line_program_for_CU(self, _unit: object) -> object:  # noqa: N802 - as pyelftools calls it
+        return self.program
 
     def get_dwarf_info(self) -> "FakeElf":
         return self

@@ -2,13 +2,17 @@
 
 import random
 import struct
+import sys
 import tempfile
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
+from unittest.mock import patch
 
 from bluepill_sim.core import BLOCK, EXCEPTION_RETURN
 from bluepill_sim.core.thumb import Instruction, Kind
 from bluepill_sim.memory.arrays import Memory
+from bluepill_sim.program import line_table
 from bluepill_sim.program.alterations import Site, alterations, expanded, size_at, word_of
 from bluepill_sim.program.elf_file import file_bytes, file_offset, layout, stack_top, variables_end, vectors
 from bluepill_sim.program.functions import FunctionTable
@@ -23,6 +27,7 @@ from bluepill_sim.program.version_difference import code_differences, line_diffe
 from bluepill_sim.program.wrong_files import wrong_kind
 from bluepill_sim.stm32f103 import FLASH_BASE, FLASH_BYTES_FITTED, SRAM_BASE, SRAM_BYTES
 from tests.bluepill_sim.program.test_image import BAD_FILES, hex_file, hex_record
+from tests.bluepill_sim.program.walks.dwarf import FakeElf, die
 from tests.tools.suite.approved import Trace, judge_of, said, tried
 
 HERE = 0x0800_0100
@@ -226,7 +231,10 @@ def programs(draw: random.Random) -> Iterator[str]:
     two = hex_record(4, 0, b"\x08\0") + hex_record(0, 0, program) + hex_record(0, 0x40, b"\1\2") + hex_record(1, 0, b"")
     yield tried(lambda each: seen(parse_image(each, "f")), two.encode())
     yield tried(lambda each: seen(parse_image(each, "f")), two.encode().lower() + b"\r\n")
-    yield tried(lambda each: seen(parse_image(each, "f")), b":\x80" + bytes(70))
+    for text in (bytes(70), b"0" * 62 + b"\x80", b"0" * 63 + b"\x80", b"\t\r\n 0", b"0\x1f", b"0\x7f"):
+        yield tried(lambda each: seen(parse_image(each, "f")), b":" + text)
+    both = hex_record(4, 0, bytes(2)) + hex_record(0, 0x8000, b"\1\2") + hex_file(FLASH_BASE, program).decode()
+    yield tried(lambda each: seen(parse_image(each, "f")), both.encode())
     for size in (7, 8, 9, 63, 64, 65):
         yield tried(lambda each: seen(parse_image(each, "f")), (program + bytes(80))[:size])
 
@@ -435,6 +443,7 @@ def mutated(draw: random.Random) -> Iterator[str]:
                 at,
                 one.patched(flash) == flash[: one.flash_offset] + code + flash[one.flash_offset + len(code) :],
                 mutated_file(b"x", one, image)[one.flash_offset :][:4].hex(),
+                len(mutated_file(b"x", one, image)),
                 whole[at : at + 4].hex(),
                 len(whole),
             ]
@@ -471,33 +480,158 @@ def mutated(draw: random.Random) -> Iterator[str]:
             )
 
 
+#: Instructions of small functions: plain ones, branches of each kind, calls, loads from beside the code.
+CODE = (
+    *(0x2001, 0x2102, 0x1840, 0x1881, 0x4608, 0xBF00, 0x3101, 0x4770, 0x681A, 0x6012),
+    *(0xD001, 0xD1FC, 0xE002, 0xE7FA, 0xB118, 0xB911, 0xDF01, 0x4802, 0x4903),
+    *(0xF000F803, 0xF7FFFFFA, 0xF0008002, 0xF47FAFFC, 0xF000B803, 0xF8DF1008, 0xF85F1004, 0xF1010105, 0xFB02F103),
+)
+#: What words of a literal pool may be: numbers, places of symbols and of texts, at the ends of the memories.
+POOL = (
+    7,
+    0x07FF_FFFF,
+    FLASH_BASE,
+    0x0800_0141,
+    0x0800_0300,
+    0x0800_0308,
+    0x0801_FFFF,
+    0x0802_0000,
+    0x1FFF_FFFF,
+    SRAM_BASE,
+    SRAM_BASE + 4,
+    SRAM_BASE + 0x4FFF,
+    SRAM_BASE + 0x5000,
+)
+
+
+def code_of(words: Iterable[int]) -> bytes:
+    return b"".join(
+        part.to_bytes(2, "little")
+        for word in words
+        for part in ((word >> 16, word & 0xFFFF) if word > 0xFFFF else (word,))
+    )
+
+
+def version(first: bytes, second: bytes, pool: bytes, *, names: tuple[str, str] = ("one", "two")) -> Image:
+    """Return a program of two functions, the first with words behind it, with texts at 0x08000300."""
+    one, start = first + bytes(len(first) % 4) + pool, FLASH_BASE + 0x140
+    body = bytes(0x138) + one + second
+    held = struct.pack("<II", 0x2000_5000, start | 1) + body.ljust(0x2F8, b"\xff") + b"hello, world and all of it\0x"
+    symbols = (
+        Symbol("low", FLASH_BASE, 4),
+        Symbol(names[0], start, len(one), True),
+        Symbol(names[1], start + len(one), len(second), True),
+        Symbol("data", SRAM_BASE, 4),
+        Symbol("more", SRAM_BASE + 4, 0),
+    )
+    return Image("version.elf", ((FLASH_BASE, held),), SymbolTable(symbols))
+
+
 def versions(draw: random.Random) -> Iterator[str]:
-    image = load_image(FOLDERS / "bluepill_sim" / "analysis" / "silicon" / "pins.elf")
-    ran = range(image.segments[0][0], image.segments[0][0] + len(image.segments[0][1]), 2)
-    for one in draw.sample(mutants(image, ran), 6):
-        other = one.image(image)
-        yield f"{one.alteration.before} > {one.alteration.after}"
-        yield said(code_differences(other, image))
-        yield said([(each, each.missing) for each in line_differences(other, image)])
-    # Words of literal pools, and whole pieces of code that move.
-    start, held = image.segments[0]
-    for at in sorted(draw.sample(range(0x140, len(held) - 8, 4), 6)):
-        for put in (
-            struct.pack("<I", draw.choice((7, SRAM_BASE, SRAM_BASE + 4, start + 0x141, start + len(held) - 5))),
-            b"\0\xbf",
-            b"\xfe\xe7",
-        ):
-            other = Image(image.name, ((start, held[:at] + put + held[at + len(put) :]),), image.symbols)
-            yield said(
-                [
-                    [(one.function, one.ours, one.theirs, one.before) for one in code_differences(other, image)],
-                    line_differences(other, image),
-                ]
+    for _ in range(70):
+        words, others = draw.choices(CODE, k=9), draw.choices(CODE, k=4)
+        pool = draw.choices(POOL, k=3)
+        image = version(code_of(words), code_of(others), struct.pack("<3I", *pool))
+        place = draw.randrange(len(words))
+        changed = [*words]
+        match draw.randrange(5):
+            case 0:
+                changed[place] ^= 1 << draw.randrange(12)
+            case 1:
+                del changed[place]
+            case 2:
+                changed.insert(place, draw.choice(CODE))
+            case 3:
+                pool[draw.randrange(3)] = draw.choice(POOL)
+            case _:
+                changed[place] = draw.choice(CODE)
+        other = version(code_of(changed), code_of(others), struct.pack("<3I", *pool))
+        yield said([(one.function, one.ours, one.theirs, one.before) for one in code_differences(other, image)])
+    branches = [word for word in CODE if word in {0xD001, 0xE002, 0xB118, 0xB911} or word > 0xF000_0000]
+    for word in branches:  # each bit of what leads elsewhere
+        image = version(code_of([0xBF00, word, 0xBF00]), code_of([0x4770]), struct.pack("<I", 7))
+        for bit in range(32 if word > 0xFFFF else 16):
+            other = version(code_of([0xBF00, word ^ 1 << bit, 0xBF00]), code_of([0x4770]), struct.pack("<I", 7))
+            yield f"{word:x} {bit} " + said(
+                [(one.function, one.ours, one.theirs) for one in code_differences(other, image)]
             )
+    for one in POOL:
+        made = [
+            version(code_of([0x4801, 0x4770]), code_of([0x4770]), struct.pack("<I", value)) for value in (one, *POOL)
+        ]
+        yield " ".join("same" if not code_differences(made[0], each) else "other" for each in made)
+    one, two = (version(code_of([0x4770]), code_of([0x4770]), b"", names=("one", name)) for name in ("two", "three"))
+    yield said(code_differences(one, two))
+
+
+def lines_of_versions(draw: random.Random) -> Iterator[str]:
+    image = load_image(FOLDERS / "bluepill_sim" / "analysis" / "silicon" / "pins.elf")
+    start, held = image.segments[0]
+    for one in draw.sample(mutants(image, range(start + 0x140, start + len(held), 2)), 6):
+        other = one.image(image)
+        yield f"{one.alteration.before} > {one.alteration.after} {said(code_differences(other, image))}"
+        yield said([(each, each.missing) for each in line_differences(other, image)])
+    for at in sorted(draw.sample(range(0x140, len(held) - 8, 4), 5)):
+        for put in (b"\0\xbf", b"\xfe\xe7", bytes((held[at] ^ 8, held[at + 1]))):
+            other = Image(image.name, ((start, held[:at] + put + held[at + len(put) :]),), image.symbols)
+            yield said(line_differences(other, image))
     one, other = load_image(FIRMWARE / "usb_echo.elf"), load_image(FIRMWARE / "board_test.elf")
     for pair in ((one, other), (other, one)):
-        yield "\n".join(map(said, code_differences(*pair)))
         yield "\n".join(map(said, [(each, each.missing) for each in line_differences(*pair)]))
+
+
+def line_programs(draw: random.Random) -> Iterator[str]:
+    """Line programs of each version, with folders and files as compilers write them."""
+    image = Image("l", ((FLASH_BASE, struct.pack("<II", 0x2000_5000, 0x0800_0009)),))
+    at_zero = Image("l", image.segments, linked_at=0)
+    for number in (2, 3, 4, 5):
+        for compiled_in in ("/home/x", None):
+            states: list[SimpleNamespace | None] = [None]
+            for _ in range(40):
+                base = draw.choice(
+                    (0, FLASH_BASE, FLASH_BASE + 0x1_FFF0, SRAM_BASE, SRAM_BASE + SRAM_BYTES - 8, 0x0802_0000)
+                )
+                states += [
+                    SimpleNamespace(
+                        address=base + at, line=draw.choice((0, 1, 7)), file=draw.randint(1, 4), end_sequence=at == 12
+                    )
+                    for at in (0, draw.choice((0, 4)), draw.choice((4, 8)), 12)
+                ]
+            program = SimpleNamespace(
+                header={
+                    "version": number,
+                    "include_directory": [b"/home/x", b"sub", b"/usr/include", b"."],
+                    "file_entry": [
+                        SimpleNamespace(name=name, dir_index=folder)
+                        for name, folder in ((b"a.c", 0), (b"b.h", 1), (b"/abs/c.c", 2), (b"d.h", 2), (b"./e.c", 3))
+                    ],
+                },
+                get_entries=lambda states=states: [SimpleNamespace(state=state) for state in states],
+            )
+            given = {} if compiled_in is None else {"comp_dir": compiled_in}
+            elf = FakeElf((die("compile_unit", **given),), program)
+            for each in (image, at_zero):
+                yield said(
+                    [(f"{row.address:x}", f"{row.end:x}", row.file, row.line) for row in lines_in(each, elf).rows]
+                )
+    yield said([lines_in(image, FakeElf((die("compile_unit"),), None)).rows, lines_in(image, FakeElf(())).rows])
+    broken = SimpleNamespace(header={"version": 5})
+    yield tried(lines_in, image, FakeElf((die("compile_unit"),), broken))
+    elf = PROGRAMS[0].read_bytes() + bytes(3)  # no other test has read it
+    for module, data in (("elftools.elf.elffile", elf), ("intelhex", b":00" + bytes(20).hex().encode())):
+        with patch.dict(sys.modules, {module: None}):
+            yield tried(parse_image, data, "a").split(" (")[0]
+    with patch.dict(sys.modules, {"elftools.common.exceptions": None}):
+        yield tried(lines_in, image, FakeElf(())).split(" (")[0]
+
+
+def lines_in(image: Image, elf: FakeElf) -> LineTable:
+    line_table._lines_of.cache_clear()
+    with (
+        patch("elftools.elf.elffile.ELFFile", lambda _: elf),
+        patch.object(line_table, "file_bytes", lambda _: b"\x7fELF"),
+    ):
+        return read_lines(image)
 
 
 def last(draw: random.Random) -> Iterator[str]:
@@ -519,6 +653,7 @@ def last(draw: random.Random) -> Iterator[str]:
 
 def resets(draw: random.Random) -> Iterator[str]:
     row, now, seen_so = ResetRow(), 0, list[object]()
+    yield said([row, str(row)])
     for _ in range(MOST_RESETS + 3):
         now += LEAST_NS - 1
         seen_so.append(row.add(now))
@@ -544,6 +679,8 @@ TRACES: dict[str, Trace] = {
     "blocks": blocks,
     "mutated": mutated,
     "versions": versions,
+    "lines_of_versions": lines_of_versions,
+    "line_programs": line_programs,
     "last": last,
     "resets": resets,
 }

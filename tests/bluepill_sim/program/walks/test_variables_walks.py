@@ -2,6 +2,7 @@
 
 import random
 import struct
+import sys
 from collections.abc import Iterator
 from unittest.mock import patch
 
@@ -268,6 +269,12 @@ def leaves_of(image: Image, unit: Die) -> list[Variable]:
 
 
 def numbers(draw: random.Random) -> Iterator[str]:
+    whole = Variable(name="x", type_name="int", address=1, size=4, encoding=NumberForm.SIGNED)
+    yield f"{whole} {whole.number(bytes((1, 2, 3, 0x84)))}"
+    with patch.dict(sys.modules, {"elftools.common.exceptions": None}):
+        yield tried(table_of, Image("m", ((FLASH_BASE, struct.pack("<II", 0x2000_5000, 0x0800_0009)),)), ()).split(
+            " ("
+        )[0]
     for form in NumberForm:
         for size in (1, 2, 4, 8):
             for first, bits in ((0, 0), (0, 1), (3, 5), (7, 1), (1, 8 * size - 1), (0, 8 * size)):
