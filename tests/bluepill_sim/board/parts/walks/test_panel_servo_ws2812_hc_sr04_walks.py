@@ -96,6 +96,10 @@ def panels(draw: random.Random) -> Iterator[str]:
                 ]
             )
         yield said([panel.picture().width, panel.picture().scale(), len(panel.picture().rows)])
+    alone = LedPanel()
+    alone._lit_ns["led0"] = 5
+    alone.changed([(7, "led0", True)])
+    yield said(alone.lit_ns("led0"))
     yield said([LedPanel().words(), sorted(LedPanel.PINS), Button.PINS, Potentiometer.PINS])
 
 
@@ -223,6 +227,7 @@ def strings(draw: random.Random) -> Iterator[str]:
             yield said([answer, string.snapshot(), string.next_deadline()])
         string.select(now)
         string.deselect(now)
+    yield said([sorted(Ws2812.spi_modes), Ws2812.max_hz])
     yield tried(Ws2812().plug, FakeSocket()) + said([Ws2812().words(), len(Ws2812().shown)])
 
 
@@ -265,6 +270,8 @@ def echoes(draw: random.Random) -> Iterator[str]:
 
 
 def pictures(draw: random.Random) -> Iterator[str]:
+    small = Picture((((1, 2, 3), (255, 0, 9)),))
+    yield said(small.png() == small.png(1))
     for width, height in ((1, 1), (2, 4), (3, 5), (32, 2), (33, 9), (512, 1), (513, 1), (300, 3)):
         picture = Picture(
             tuple(

@@ -245,6 +245,8 @@ def settings(draw: random.Random) -> Iterator[str]:
     made = SimpleNamespace(oled=Ssd1306(), imu=Mpu6050(), gps=Gps())
     for part in vars(made).values():
         yield said([part.words(), part.snapshot()])
+    made.imu.advance_to(1)
+    yield said([made.imu.words(), made.imu.snapshot(), sorted(made.oled.spi_modes), made.oled.max_hz])
 
 
 TRACES: dict[str, Trace] = {"oleds": oleds, "sensors": sensors, "receivers": receivers, "settings": settings}
