@@ -49,8 +49,20 @@ def found_in(found: PinComparison) -> str:
     )
 
 
-def late_of(found: PinComparison) -> object:
-    return getattr(found, "median_late_ns", None)
+def late_of(found: PinComparison) -> list[float | None]:
+    return [found.late_ns(one) for one in found.met]
+
+
+def with_pulses(draw: random.Random, run: Waveforms, sample_ns: float) -> Waveforms:
+    """Return a run with pulses of about a sample, which an analyser may not have seen."""
+    pin = draw.choice([*run.signals])
+    edges = list(run.signals[pin].edges)
+    for _ in range(draw.choice((1, 2))):
+        at = draw.randrange(len(edges) - 1)
+        when, level = edges[at][0] + 20.0, edges[at][1]
+        pulse = draw.choice((sample_ns, sample_ns - 1.0, sample_ns + 1.0))
+        edges[at + 1 : at + 1] = [(when, level ^ 1), (when + pulse, level)]
+    return with_edges(run, {pin: sorted(edges)})
 
 
 def skewed(draw: random.Random, capture: Waveforms) -> Waveforms:
@@ -92,7 +104,7 @@ def skewed(draw: random.Random, capture: Waveforms) -> Waveforms:
 
 
 def comparisons(draw: random.Random) -> Iterator[str]:
-    for number in range(44):
+    for number in range(56):
         run = random_run(number, edges=draw.choice((5, 12, 24, 40)), pins=draw.choice((2, 3)))
         how = Analyser(
             offset_ns=draw.choice((0.0, 1e6, -3e5)),
@@ -103,6 +115,8 @@ def comparisons(draw: random.Random) -> Iterator[str]:
             between=draw.choice(((0.0, 1.0), (0.0, 1.0), (0.2, 0.8))),
         )
         capture = skewed(draw, seen(run, how))
+        if draw.random() < 0.3:
+            run = with_pulses(draw, run, how.sample_ns)
         if draw.random() < 0.2:
             pin = next(iter(run.signals))
             run = replace(run, signals={**run.signals, pin: replace(run.signals[pin], unknown=[(0.0, run.end_ns / 3)])})
@@ -205,6 +219,7 @@ $var wire 9 # word $end
 $scope module b $end
 $var reg 1 % PA0 $end
 $var real 1 & volts $end
+$var wire 4 + nibble $end
 $upscope $end
 $upscope $end
 $enddefinitions $end
@@ -218,6 +233,7 @@ $end
 #10 1! 1" b101 #
 #20
 0! r1.5 &
+1+
 1%
 #25
 Z"
@@ -371,7 +387,7 @@ def recordings(draw: random.Random, folder: Path) -> Iterator[str]:
             first_word=5,
             start_ns=100,
             end_ns=100 + span,
-            initial={"PA0": 0, "PA1": 1, "PA2": 2, "irq.USART1": 0},
+            initial={"PA0": 0, "PA1": 1, "PA2": 2, "irq.USART1": 0, "usart1.tx": 1},
             log=log,
             edges=edges,
         )
