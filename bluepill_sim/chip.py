@@ -253,16 +253,18 @@ class Chip(Stateful):
     def _advance(self, limit_ns: Nanos, go_on: Callable[[int], None]) -> ChipReached:
         processor, engine, clock, fabric = self.processor, self.engine, self._clock, self.fabric
         while True:
-            if not engine.is_inside_block:
+            # A core that a debugger halts stands still for as long as is wanted, within a block as well.
+            may_end = not engine.is_inside_block or self._frozen_since is not None
+            if may_end:
                 self._act()
             now = clock.ns_of(engine.cycle)
-            if self._stop_requested and not engine.is_inside_block:
+            if self._stop_requested and may_end:
                 self._stop_requested = False
                 return ChipReached(now, Reason.EDGE)
             is_over = self.is_held or (processor.is_locked_up and not self.parts.has_running_watchdog)
             if is_over and now >= limit_ns:
                 return ChipReached(now, Reason.HALT)
-            if now >= limit_ns and not engine.is_inside_block:
+            if now >= limit_ns and may_end:
                 return ChipReached(now, Reason.DEADLINE)
             if self._core_stands_still():
                 self._pass_time(limit_ns)
@@ -508,7 +510,7 @@ class Chip(Stateful):
 
     def _pass_time(self, limit_ns: Nanos) -> None:
         engine = self.engine
-        if not engine.is_inside_block:
+        if not engine.is_inside_block or self._frozen_since is not None:
             engine.cycle = max(engine.cycle, self._next_cycle(limit_ns))
             return
         # What ends the wait is no boundary of the program: SysTick and the limit wait for one.
