@@ -54,7 +54,7 @@ def text(words: str) -> bytes:
 
 @dataclass
 class Device:
-    """A function that answers the host by tables and by chance, and writes down what it is told."""
+    """A function that answers the host by tables and by chance, and writes down what it is lines."""
 
     draw: random.Random
     configuration: bytes = CDC
@@ -216,9 +216,9 @@ def sessions(draw: random.Random) -> Iterator[str]:
 
 
 def session(bench: Bench, draw: random.Random) -> Iterator[str]:
-    told = bench.device.lines
-    line = UsbSerial(bench.host, lambda *_: None, lambda: told.append("stop"))
-    end = line.subscribe(lambda rows: told.append(f"line {said([*rows][:3])}"), ends_slice=True)
+    lines = bench.device.lines
+    line = UsbSerial(bench.host, lambda *_: None, lambda: lines.append("stop"))
+    end = line.subscribe(lambda rows: lines.append(f"line {said([*rows][:3])}"), ends_slice=True)
     line.receive(b"before")
     bench.host.set_line(bytes((1, 2, 3, 4, 5, 6, 7)), is_open=draw.random() < 0.5)
     yield tried(bench.host.wait_configured) + bench.seen()
