@@ -99,7 +99,11 @@ def life(draw: random.Random, *, steps: int = 28) -> Iterator[str]:
     has_four_bits = draw.random() < 0.3
     settings = settings_of(draw)
     sequence = Sequence(
-        settings, has_four_bits=has_four_bits, robot=draw.choice(("p2dx", "p3dx", "p3at")), has_uart=draw.random() < 0.3
+        settings,
+        has_four_bits=has_four_bits,
+        robot=draw.choice(("p2dx", "p3dx", "p3at")),
+        has_uart=draw.random() < 0.3,
+        waits_for_edges=draw.random() < 0.3,
     )
     twins, seen = sequence.twins, watched(sequence.twins)
     for step in range(steps):
