@@ -178,8 +178,8 @@ class RaceSearch:
         look: Callable[[], None] = lambda: None,
     ) -> None:  # fmt: skip
         self._image, self._span_ns, self._play, self._most, self._look = image, span_ns, play, most, look
-        self._slack = Slack(latency_ns=0, stretch_ns=0, entries=())
-        self._as_it_is = RunOutputs(channels={}, end=0, interrupts=0)
+        self._slack: Slack
+        self._as_it_is: RunOutputs
 
     def search(self, seeds: Sequence[int]) -> RaceReport:
         """Run the program once as it is and once under the latencies of each seed, and narrow down what differs.
@@ -410,7 +410,7 @@ def _items(name: str, channel: Channel) -> Iterator[tuple[Nanos, str, int]]:
 
 def _shown(run: RunOutputs, parting: OutputParting, slack: Slack) -> tuple[str, ...]:
     """Return what a run puts out from a parting on, as words."""
-    since = parting.at - slack.near if parting.other else 0
+    since = parting.at - slack.near
     rows = sorted(
         (at, name, run.channels[name].values[place])
         for channel in (parting.channel, parting.other) if channel in run.channels
