@@ -292,6 +292,12 @@ def ways(draw: random.Random) -> Iterator[str]:
         else:
             found = getattr(execution, what)()
         yield f"{what} {said(found)} {seen.where()}"
+    seen = Seen()
+    for payload in (
+        *("p", "P=00000000", "P5", "m,4", "m20000000,", "vFlashErase:8000000,400", "m8000000,8", "s"),
+        *(b"vFlashWrite:8000000:" + bytes(8), "vFlashErase:801fc00,400", "vFlashErase:7fffc00,400", "vFlashDone", "c"),
+    ):
+        yield f"{payload!r}: {seen.ask(payload)} {seen.where()}"
     for source in (
         "movs r0, #0\nmov32 r1, #0xE000ED14\nmovs r2, #16\nstr r2, [r1, #0]\nmovs r3, #4\nudiv r0, r3, r0\ntick: nop",
         "udf\ntick: nop",
@@ -346,6 +352,14 @@ def chips(draw: random.Random) -> Iterator[str]:
         ]
     )
     yield said(inspector.layout)
+    for below in (0, 4, 124, 128, 132, 0x300):
+        inspector.set_register("sp", 0x2000_5000 - below)
+        yield said(stack_rows(board))
+    for pended in (1 << 31, 1 << 28, 1 << 26):
+        inspector.write_memory(0xE000_ED04, pended.to_bytes(4, "little"))
+        yield said(exception_rows(board))
+    board.step(board.now_ns + 1_000)
+    yield said([exception_rows(board), core_rows(board), source_place(board)])
 
 
 def calls(draw: random.Random) -> Iterator[str]:
