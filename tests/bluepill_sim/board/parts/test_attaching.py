@@ -205,7 +205,7 @@ def test_a_part_that_stays_due_is_an_error_and_no_hang(tmp_path: Path) -> None:
         ("button,out=PA8,is_active_low=perhaps", "'perhaps' is not true or false"),
         ("leds", "the leds is connected to nothing"),
         ("ws2812", "the ws2812 is connected to nothing"),
-        ("can-node,on=CAN,data=0", "non-hexadecimal"),
+        ("can-node,on=CAN,data=0", "no data in hex"),
         ("none.py:Part", "there is no file none.py"),
     ],
 )
