@@ -218,7 +218,7 @@ class Seen:
         self.machine = Machine(source, {SYSTICK: "tick"})
         self.board = self.machine.board
         self.printed = bytearray()
-        self.execution = Execution(LoneChip(self.board), self.printed.extend, most_points=most_points, slice_ns=200_000)
+        self.execution = Execution(LoneChip(self.board), self.printed.extend, most_points=most_points, slice_ns=70_000)
         self.looks = 0
         self.execution.wants_stop = self._has_enough
         self.session = GdbSession(self.execution)
@@ -246,7 +246,7 @@ class Seen:
 
 
 def sessions(draw: random.Random) -> Iterator[str]:
-    for _ in range(9):
+    for _ in range(7):
         seen = Seen(most_points=draw.choice((64, 4)))
         for _ in range(55):
             if draw.random() < 0.22:
