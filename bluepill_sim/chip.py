@@ -56,8 +56,10 @@ from bluepill_sim.stm32f103 import (
     SRAM_BYTES,
     SYSTEM_MEMORY_BASE,
     WAKING_IRQS,
+    is_in_sram,
     make_parts,
     make_pins,
+    without_alias,
 )
 from simbase.state import Stateful
 from simbase.timing import Nanos, Reason
@@ -251,16 +253,18 @@ class Chip(Stateful):
     def _advance(self, limit_ns: Nanos, go_on: Callable[[int], None]) -> ChipReached:
         processor, engine, clock, fabric = self.processor, self.engine, self._clock, self.fabric
         while True:
-            if not engine.is_inside_block:
+            # A core that a debugger halts stands still for as long as is wanted, within a block as well.
+            may_end = not engine.is_inside_block or self._frozen_since is not None
+            if may_end:
                 self._act()
             now = clock.ns_of(engine.cycle)
-            if self._stop_requested and not engine.is_inside_block:
+            if self._stop_requested and may_end:
                 self._stop_requested = False
                 return ChipReached(now, Reason.EDGE)
             is_over = self.is_held or (processor.is_locked_up and not self.parts.has_running_watchdog)
             if is_over and now >= limit_ns:
                 return ChipReached(now, Reason.HALT)
-            if now >= limit_ns and not engine.is_inside_block:
+            if now >= limit_ns and may_end:
                 return ChipReached(now, Reason.DEADLINE)
             if self._core_stands_still():
                 self._pass_time(limit_ns)
@@ -506,7 +510,7 @@ class Chip(Stateful):
 
     def _pass_time(self, limit_ns: Nanos) -> None:
         engine = self.engine
-        if not engine.is_inside_block:
+        if not engine.is_inside_block or self._frozen_since is not None:
             engine.cycle = max(engine.cycle, self._next_cycle(limit_ns))
             return
         # What ends the wait is no boundary of the program: SysTick and the limit wait for one.
@@ -596,7 +600,7 @@ class Chip(Stateful):
     def _measure(self, address: int, size: int) -> BasicBlock:
         """Return the costs of a block at the present flash settings."""
         code = self.engine.flash_patch.fetched(address, self.memory.read(address, size) or b"")
-        is_sram = SRAM_BASE <= address < SRAM_BASE + SRAM_BYTES
+        is_sram = is_in_sram(address)
         wait_states, has_prefetch = (0, True) if is_sram else self._flash_access
         return measure_block(code, address, wait_states, has_prefetch=has_prefetch)
 
@@ -655,7 +659,7 @@ class Chip(Stateful):
                 return False
             self._flash_repairs.append((OPTION_BYTES_BASE, self.memory.options))
             return True
-        offset = address - FLASH_BASE if address >= FLASH_BASE else address
+        offset = without_alias(address) - FLASH_BASE
         if not 0 <= offset <= FLASH_BYTES_FITTED - size:
             return False
         if not self.parts.flash.program(offset, size, value):
@@ -666,7 +670,7 @@ class Chip(Stateful):
 
     def _program_at_once(self, address: int, size: int, pc: int, cycle: int, stop_at: int) -> int | None:
         """Program a halfword for code in flash, which waits for it, where nothing else is due before it ends."""
-        offset = address - FLASH_BASE if address >= FLASH_BASE else address
+        offset = without_alias(address) - FLASH_BASE
         if (
             size != _FLASH_WRITE_BYTES
             or offset % size

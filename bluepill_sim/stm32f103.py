@@ -447,6 +447,21 @@ def _find(
     return device, names.index(end)
 
 
+def is_in_sram(address: int) -> bool:
+    """Tell whether an address is in the SRAM."""
+    return SRAM_BASE <= address < SRAM_BASE + SRAM_BYTES
+
+
+def may_hold_code(address: int, flash: int = FLASH_BASE) -> bool:
+    """Tell whether an address is in the flash, which a program's file has at 0x08000000 or 0, or in the SRAM."""
+    return flash <= address < flash + FLASH_BYTES_FITTED or is_in_sram(address)
+
+
+def without_alias(address: int) -> int:
+    """Return where in the flash an address is that may be in its alias at 0; any other address as it is."""
+    return address + FLASH_BASE if address < FLASH_BYTES_FITTED else address
+
+
 def name_at(address: int) -> str | None:
     """Return which peripheral of the family an address belongs to, modelled or not; None: of none."""
     index = bisect_right(_NAMES, (address, "\U0010ffff")) - 1

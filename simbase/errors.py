@@ -94,6 +94,6 @@ def nearest(word: str, known: Iterable[str], otherwise: str | None = None) -> st
     """Return a hint: the nearest of the known words; where none is near, `otherwise`, or all of them."""
     from difflib import get_close_matches  # takes longer to load than most commands to fail
 
-    words = list(known)
+    words = [*map(str, known)]  # a member of a StrEnum is the word that is typed
     close = get_close_matches(word, words, n=1, cutoff=0.6)
     return f"did you mean {close[0]!r}?" if close else otherwise or f"known are {', '.join(sorted(words))}"

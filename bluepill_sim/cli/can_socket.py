@@ -272,7 +272,7 @@ class CanSocket:
                 self._peers = {}
                 if isinstance(address, str):
                     self.on_close.callback(Path(address).unlink, missing_ok=True)
-        except OSError:
+        except (OSError, CanSocketError):
             made.close()
             raise
         return made

@@ -13,7 +13,7 @@ from bluepill_sim.debug.inspector import Inspector
 from bluepill_sim.debug.target_description import REGISTERS
 from bluepill_sim.program.elf_file import stack_top
 from bluepill_sim.program.line_table import read_lines
-from bluepill_sim.stm32f103 import FLASH_BASE, FLASH_BYTES_FITTED
+from bluepill_sim.stm32f103 import FLASH_BASE, FLASH_BYTES_FITTED, without_alias
 
 #: chosen: words of the stack that a screen shows beside other things.
 MOST_WORDS = 32
@@ -80,7 +80,7 @@ def _meaning(board: BluePill, name: str, value: int) -> str:
 def code_place(board: BluePill, address: int) -> str:
     """Return the function, and the line where it is known, of an address of code; empty where it is none."""
     address &= ~1
-    offset = address - FLASH_BASE if address >= FLASH_BASE else address
+    offset = without_alias(address) - FLASH_BASE
     if not 0 < offset < FLASH_BYTES_FITTED:
         return ""
     function = board.image.symbols.where(address).rpartition(" (")[0]

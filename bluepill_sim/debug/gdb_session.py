@@ -304,7 +304,7 @@ def _number(digits: bytes) -> int:
     Raises:
         ValueError: these are others; `int` alone would take signs, spaces, underscores and 0x.
     """
-    if not 0 < len(digits) <= _MOST_DIGITS or digits.strip(_HEX_DIGITS):
+    if len(digits) > _MOST_DIGITS or digits.strip(_HEX_DIGITS):
         raise ValueError(f"{digits!r} is no hexadecimal number")
     return int(digits, 16)
 

@@ -15,7 +15,7 @@ from bluepill_sim.core.system_control import PPB_BASE, PPB_BYTES
 from bluepill_sim.debug.target_description import REGISTERS
 from bluepill_sim.errors import BluePillError
 from bluepill_sim.fabric.registers import Peripheral
-from bluepill_sim.stm32f103 import BASES, FLASH_BASE, FLASH_BYTES_FITTED, name_at
+from bluepill_sim.stm32f103 import BASES, FLASH_BASE, FLASH_BYTES_FITTED, name_at, without_alias
 
 _HANDLER_IPSR = 3
 _T_BIT = 1 << 24
@@ -120,7 +120,7 @@ class Inspector:
         if memory.write(address, data):
             self._board.chip.engine.drop_code(address, len(data))
             return True
-        offset = address - FLASH_BASE if address >= FLASH_BASE else address
+        offset = without_alias(address) - FLASH_BASE
         if 0 <= offset <= FLASH_BYTES_FITTED - len(data):
             self.program_flash(offset, data)
             return True

@@ -33,7 +33,11 @@ class CanTalker(Stateful):
         """
         if not period_ms >= 0:
             raise ValueError(f"a period of {period_ms} ms")
-        self._frame = CanFrame(identifier=identifier, data=bytes.fromhex(data), is_extended=identifier > _MOST_ID)
+        try:
+            sent = bytes.fromhex(data)
+        except ValueError:
+            raise ValueError(f"{data!r} is no data in hex, such as 01ff") from None
+        self._frame = CanFrame(identifier=identifier, data=sent, is_extended=identifier > _MOST_ID)
         self._period_ns = round(period_ms * NS_PER_MS)
         self.node = CanNode(self._heard if echoes else None)
         #: Frames that it has asked the bus for, echoes too.

@@ -136,6 +136,8 @@ def build(spec: PartSpec) -> Wiring:
         part = made(**values)
     except PartError:
         raise
+    except FileError as error:
+        raise PartError(f"{spec.kind}: {error}", hint=error.hint) from error
     except OSError as error:
         raise PartError(f"{spec.kind}: {error.filename}: {error.strerror or error}") from error
     except Exception as error:  # whatever a class of the user's raises is one line here

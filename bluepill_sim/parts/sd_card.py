@@ -265,7 +265,7 @@ class SdCard(Stateful):
 
     def _send_csd(self, argument: int, at_ns: Nanos) -> None:
         size = self._blocks * BLOCK_BYTES // CAPACITY_BYTES - 1
-        csd = bytes((0x40, 0x0E, 0, 0x32, 0x5B, 0x59, 0, size >> 16 & 0x3F, size >> 8 & 0xFF, size & 0xFF))
+        csd = bytes((0x40, 0x0E, 0, 0x32, 0x5B, 0x59, 0)) + size.to_bytes(3, "big")
         csd += bytes((0x7F, 0x80, 0x0A, 0x40, 0x00))
         self._reply()
         self._queue_data(csd + bytes((crc7(csd),)))

@@ -10,11 +10,13 @@ from pathlib import Path
 
 from bluepill_sim.core.nvic import VECTOR_COUNT, exception_name
 from bluepill_sim.errors import ImageError
-from bluepill_sim.program.image import ELF_MAGIC, Image
-from bluepill_sim.stm32f103 import FLASH_BASE, FLASH_BYTES, FLASH_BYTES_FITTED, SRAM_BASE, SRAM_BYTES
+from bluepill_sim.program.image import ELF_MAGIC, FLASH_END, Image
+from bluepill_sim.stm32f103 import FLASH_BASE, FLASH_BYTES, SRAM_BASE, SRAM_BYTES, is_in_sram, without_alias
 from simbase.files import read_bytes
 
 _SHF_ALLOC = 2
+#: Behind the stack pointer and the reset vector.
+_LEAST_TARGET = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,9 +107,8 @@ def _sections(data: bytes) -> "list[Section]":
         address, size, flags = section["sh_addr"], section["sh_size"], section["sh_flags"]
         if not flags & _SHF_ALLOC or not size:
             continue
-        in_sram = SRAM_BASE <= address < SRAM_BASE + SRAM_BYTES
         has_bytes = section["sh_type"] != "SHT_NOBITS"
-        found.append(Section(section.name, address, size, has_bytes, in_sram))
+        found.append(Section(section.name, address, size, has_bytes, is_in_sram(address)))
     return found
 
 
@@ -117,7 +118,7 @@ def vectors(image: Image) -> list[Vector]:
     for number in range(1, VECTOR_COUNT):
         word = image.word(image.vector_table + 4 * number)
         target = word & ~1
-        if word & 1 and (FLASH_BASE <= target < FLASH_BASE + FLASH_BYTES_FITTED or 8 <= target < FLASH_BYTES_FITTED):
+        if word & 1 and target >= _LEAST_TARGET and FLASH_BASE <= without_alias(target) < FLASH_END:
             found.append(Vector(number, exception_name(number), target))
     return found
 

@@ -6,7 +6,7 @@ Invariant: a function reaches to its size, or to the next symbol where the file 
 from bisect import bisect_right
 
 from bluepill_sim.program.image import Image, Symbol
-from bluepill_sim.stm32f103 import FLASH_BYTES_FITTED, SRAM_BASE, SRAM_BYTES
+from bluepill_sim.stm32f103 import may_hold_code
 
 #: chosen: so far the last symbol reaches, where the file does not say.
 _LAST_REACH_BYTES = 0x1000
@@ -18,7 +18,7 @@ class FunctionTable:
     """The functions of an image, by address."""
 
     def __init__(self, image: Image) -> None:
-        code = [s for s in image.symbols.symbols if _may_hold_code(s.address, image.linked_at)]
+        code = [s for s in image.symbols.symbols if may_hold_code(s.address, image.linked_at)]
         self.functions: list[Symbol] = [s for s in code if s.is_function]
         self._symbols = code
         self._addresses = [symbol.address for symbol in code]
@@ -51,7 +51,3 @@ class FunctionTable:
         if symbol.size:
             return symbol.address + symbol.size
         return self._addresses[index + 1] if index + 1 < len(self._addresses) else symbol.address + _LAST_REACH_BYTES
-
-
-def _may_hold_code(address: int, flash: int) -> bool:
-    return flash <= address < flash + FLASH_BYTES_FITTED or SRAM_BASE <= address < SRAM_BASE + SRAM_BYTES

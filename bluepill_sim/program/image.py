@@ -16,7 +16,7 @@ from pathlib import Path
 
 from bluepill_sim.errors import ImageError
 from bluepill_sim.program.wrong_files import wrong_kind
-from bluepill_sim.stm32f103 import FLASH_BASE, FLASH_BYTES_FITTED, SRAM_BASE, SRAM_BYTES
+from bluepill_sim.stm32f103 import FLASH_BASE, FLASH_BYTES_FITTED, SRAM_BASE, SRAM_BYTES, without_alias
 from simbase.errors import MissingDependencyError
 from simbase.files import read_bytes
 
@@ -127,7 +127,7 @@ class Image:
                 f"is not in the SRAM ({SRAM_BASE:#010x} to {_STACK_END:#010x})",
                 hint="the first word of the flash must be the top of the stack",
             )
-        if not entry & 1 or not FLASH_BASE <= self._in_flash(entry) < FLASH_END:
+        if not entry & 1 or not FLASH_BASE <= without_alias(entry) < FLASH_END:
             raise ImageError(
                 f"{self.name}: the reset vector {entry:#010x} is not a Thumb address in the flash",
                 hint="the second word of the flash must be the address of Reset_Handler, bit 0 set",
@@ -151,11 +151,6 @@ class Image:
                 if 0 <= address + n - start < len(data):
                     result[n] = data[address + n - start]
         return int.from_bytes(result, "little")
-
-    @staticmethod
-    def _in_flash(address: int) -> int:
-        """Return the address behind the alias at 0."""
-        return address + FLASH_BASE if address < FLASH_BYTES_FITTED else address
 
 
 def load_image(path: str | Path) -> Image:
@@ -289,5 +284,5 @@ def _image_at(name: str, segments: list[tuple[int, bytes]], symbols: SymbolTable
     """Return an image whose pieces may stand in the flash's alias at 0 (RM0008 3.4): the array is the same."""
     lowest = min((address for address, data in segments if data), default=FLASH_BASE)
     linked_at = 0 if lowest < FLASH_BYTES_FITTED else FLASH_BASE
-    moved = ((address + FLASH_BASE if address < FLASH_BYTES_FITTED else address, data) for address, data in segments)
+    moved = ((without_alias(address), data) for address, data in segments)
     return Image(name, tuple(moved), symbols, digest, linked_at)

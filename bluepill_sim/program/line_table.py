@@ -17,7 +17,7 @@ from typing import Any
 from bluepill_sim.errors import ImageError
 from bluepill_sim.program.elf_file import file_bytes
 from bluepill_sim.program.image import ELF_MAGIC, Image
-from bluepill_sim.stm32f103 import FLASH_BYTES_FITTED, SRAM_BASE, SRAM_BYTES
+from bluepill_sim.stm32f103 import may_hold_code
 from simbase.errors import FileError, MissingDependencyError
 from simbase.files import read_text
 
@@ -145,8 +145,7 @@ def _rows_of(program: Any, files: _Files, flash: int) -> list[LineRow]:  # pyelf
             continue
         if last is not None and state.address > last.address and last.line:
             row = LineRow(last.address, state.address, files.name(last.file), last.line)
-            is_in_flash = flash <= row.address < flash + FLASH_BYTES_FITTED
-            if is_in_flash or SRAM_BASE <= row.address < SRAM_BASE + SRAM_BYTES:
+            if may_hold_code(row.address, flash):
                 rows.append(row)
         last = None if state.end_sequence else state
     return rows

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from bluepill_sim.program.alterations import Alteration, Site, alterations, it_count, size_at, word_of
 from bluepill_sim.program.elf_file import file_offset
 from bluepill_sim.program.image import ELF_MAGIC, Image
-from bluepill_sim.stm32f103 import FLASH_BASE, FLASH_BYTES_FITTED
+from bluepill_sim.stm32f103 import FLASH_BASE, without_alias
 
 #: chosen: so far behind a MOVW its MOVT is looked for; compilers put others between the two.
 _MOVT_WITHIN = 4
@@ -30,7 +30,7 @@ class Mutant:
     @property
     def flash_offset(self) -> int:
         """Where it stands in the flash array."""
-        return self.address - FLASH_BASE if self.address >= FLASH_BASE else self.address
+        return without_alias(self.address) - FLASH_BASE
 
     def patched(self, flash: bytes) -> bytes:
         """Return the contents of the flash array with the change."""
@@ -82,7 +82,7 @@ class _Reader:
 
     def code(self, address: int) -> bytes:
         """Return the bytes of the instruction at an address; nothing where the program has none there."""
-        at = address + FLASH_BASE if address < FLASH_BYTES_FITTED else address
+        at = without_alias(address)
         for start, data in self._segments:
             offset = at - start
             if 0 <= offset <= len(data) - 2:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from bluepill_sim.core.thumb import Instruction, decode
 from bluepill_sim.extension.encodings import Kind
 from bluepill_sim.memory.arrays import Memory
+from bluepill_sim.program.alterations import word_of
 
 #: Instructions after which execution may go on elsewhere.
 _LEAVING = frozenset({
@@ -22,7 +23,6 @@ _LEAVING = frozenset({
 _SLEEPING = frozenset({Kind.WAIT_INTERRUPT, Kind.WAIT_EVENT})
 #: chosen: longer than any real block; code that never branches is no code.
 _MAX_INSTRUCTIONS = 1024
-_FIRST_WIDE = 0xE800
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +113,7 @@ class StaticCode:
             if code is None:
                 break
             last = decode(code, 0, at)
-            word = _word(code)
+            word = word_of(code[: last.size])
             addresses.append(at)
             at += last.size
             is_in_it = conditional_left > 0
@@ -127,11 +127,6 @@ class StaticCode:
         is_conditional = leaves and (is_in_it or _has_condition(last, word))
         is_call = last.kind is Kind.CALL or (last.size == 2 and word & 0xFF80 == 0x4780)
         return StaticBlock(start, at, tuple(addresses), last, is_conditional, is_call)
-
-
-def _word(code: bytes) -> int:
-    first = code[0] | code[1] << 8
-    return first if first < _FIRST_WIDE or len(code) < 4 else first << 16 | code[2] | code[3] << 8
 
 
 def _has_condition(instruction: Instruction, word: int) -> bool:

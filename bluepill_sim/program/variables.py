@@ -22,7 +22,7 @@ from typing import Any, TypeAlias
 from bluepill_sim.errors import ImageError
 from bluepill_sim.program.elf_file import file_bytes
 from bluepill_sim.program.image import ELF_MAGIC, Image, SymbolTable
-from bluepill_sim.stm32f103 import SRAM_BASE, SRAM_BYTES
+from bluepill_sim.stm32f103 import SRAM_BYTES, is_in_sram
 from simbase.errors import MissingDependencyError, UsageError, nearest, shown
 
 _OP_ADDR, _OP_PLUS_UCONST = 0x03, 0x23
@@ -169,22 +169,23 @@ class VariableTable:
 
     def _with_scope(self, begun: str, name: str) -> tuple[str, str]:
         """Return a name with what stands before it, where one function, file or namespace alone has it."""
-        if begun and begun not in self.roots and begun not in self.ambiguous:
+        if begun not in self.roots and begun not in self.ambiguous:
             inner = [root for root in self.roots if root.endswith(f"::{begun}")]
-            if len(inner) == 1:
-                return inner[0], inner[0] + name[len(begun) :]
+            match inner:
+                case [whole]:
+                    return whole, whole + name.removeprefix(begun)
         return begun, name
 
     def offered(self, begun: str, most: int = MOST_OFFERED) -> list[str]:
         """Return names of numbers in SRAM that begin so, or else that have it in them, in the order of names."""
         begun = begun.strip()
         names = [leaf for root, (address, found) in sorted(self.roots.items())
-                 if SRAM_BASE <= address < SRAM_BASE + SRAM_BYTES and (root.startswith(begun) or begun.startswith(root))
+                 if is_in_sram(address)
                  for leaf in islice((one.name for one in _leaves(root, address, found)), SRAM_BYTES)
                  if leaf.startswith(begun)]  # fmt: skip
         if not names:
             names = [leaf.name for root, (address, found) in sorted(self.roots.items())
-                     if SRAM_BASE <= address < SRAM_BASE + SRAM_BYTES
+                     if is_in_sram(address)
                      for leaf in islice(_leaves(root, address, found), SRAM_BYTES)
                      if begun.lower() in leaf.name.lower()]  # fmt: skip
         return names[:most]

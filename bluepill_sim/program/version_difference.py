@@ -20,7 +20,7 @@ from bluepill_sim.extension.encodings import Kind, find
 from bluepill_sim.program.functions import FunctionTable
 from bluepill_sim.program.image import Image, Symbol
 from bluepill_sim.program.line_table import LineRow, LineTable, read_lines
-from bluepill_sim.stm32f103 import FLASH_BASE, FLASH_BYTES_FITTED, SRAM_BASE, SRAM_BYTES
+from bluepill_sim.stm32f103 import SRAM_BASE, may_hold_code
 
 #: Bits of a branch that are no offset, by its size and what marks it.
 _CBZ, _CONDITIONAL = (0xF500, 0xB100), (0xF000, 0xD000)
@@ -76,7 +76,7 @@ def line_differences(ours: Image, theirs: Image) -> list[LineDifference]:
         ImageError: The debug information of one is damaged.
     """
     mine, other, tables = _Version(ours), _Version(theirs), (read_lines(ours), read_lines(theirs))
-    found, differences = [], code_differences(ours, theirs)
+    found, differences = [], _differences(mine, other)
     for name in dict.fromkeys(one.function for one in differences):
         pair = mine.functions.get(name), other.functions.get(name)
         if pair[0] is None and pair[1] is not None and (gone := _emptied(pair[1], tables)):
@@ -98,7 +98,10 @@ def line_differences(ours: Image, theirs: Image) -> list[LineDifference]:
 
 def code_differences(ours: Image, theirs: Image) -> list[CodeDifference]:
     """Return where the functions of two versions differ, those of only one of them too, by our addresses."""
-    mine, other = _Version(ours), _Version(theirs)
+    return _differences(_Version(ours), _Version(theirs))
+
+
+def _differences(mine: "_Version", other: "_Version") -> list[CodeDifference]:
     found: list[CodeDifference] = []
     for name in dict.fromkeys([*mine.functions, *other.functions]):
         pair = one, two = mine.functions.get(name), other.functions.get(name)
@@ -180,7 +183,7 @@ class _Version:
     def _meaning(self, address: int) -> object:
         """Return what a word of a literal pool stands for: a symbol, a text, or the number itself."""
         value = int.from_bytes(self._bytes(address, 4), "little")
-        if not (FLASH_BASE <= value < FLASH_BASE + FLASH_BYTES_FITTED or SRAM_BASE <= value < SRAM_BASE + SRAM_BYTES):
+        if not may_hold_code(value):
             return value
         place = bisect_right(self._starts, value) - 1
         symbol = self._symbols[place] if place >= 0 else None

@@ -217,3 +217,9 @@ def test_a_file_cut_anywhere_loads_or_is_refused_but_never_crashes(start: int, l
     except PinoutError:
         return
     assert len({wire.bluepill for wire in pinout.wires}) == len(pinout.wires)
+
+
+def test_a_misspelt_role_is_answered_with_the_word_that_the_file_has() -> None:
+    with pytest.raises(PinoutError) as refused:
+        parse_pinout(TEXT.replace('role = "encoder"', 'role = "encodr"', 1))
+    assert refused.value.hint == "did you mean 'encoder'?"

@@ -48,7 +48,7 @@ TESTS_OF_C = {
     "bluepill_sim/extension/source": ("tests/bluepill_sim/fabric", "tests/bluepill_sim/native", "tests/bluepill_sim"),
     "robot_bench/wires": ("tests/robot_bench/wires",),
     "adapter_fw/core/app": ("tests/adapter_fw/test_units.py", "tests/adapter_fw/test_shell.py"),
-    "adapter_fw/core": ("tests/adapter_fw/test_sameness.py", "tests/adapter_fw/test_units.py",
+    "adapter_fw/core": ("tests/adapter_fw/walks", "tests/adapter_fw/test_sameness.py", "tests/adapter_fw/test_units.py",
                         "tests/adapter_sim/test_settings.py", "tests/adapter_fw/test_safety.py",
                         "tests/adapter_fw/test_program.py", "tests/adapter_fw/test_in_the_bench.py"),
 }  # fmt: skip

@@ -178,8 +178,8 @@ class RaceSearch:
         look: Callable[[], None] = lambda: None,
     ) -> None:  # fmt: skip
         self._image, self._span_ns, self._play, self._most, self._look = image, span_ns, play, most, look
-        self._slack = Slack(latency_ns=0, stretch_ns=0, entries=())
-        self._as_it_is = RunOutputs(channels={}, end=0, interrupts=0)
+        self._slack: Slack
+        self._as_it_is: RunOutputs
 
     def search(self, seeds: Sequence[int]) -> RaceReport:
         """Run the program once as it is and once under the latencies of each seed, and narrow down what differs.
@@ -410,22 +410,14 @@ def _items(name: str, channel: Channel) -> Iterator[tuple[Nanos, str, int]]:
 
 def _shown(run: RunOutputs, parting: OutputParting, slack: Slack) -> tuple[str, ...]:
     """Return what a run puts out from a parting on, as words."""
-    names = [name for name in (parting.channel, parting.other) if name in run.channels]
-    since = parting.at - slack.near if parting.other else 0
-    rows = merge(*(
-        ((at, name, value) for place, (at, value) in enumerate(zip(*_of(run.channels[name]), strict=True))
-         if (at >= since if parting.other else place >= parting.place))
-        for name in names
-    ))  # fmt: skip
-    return tuple(f"{name} {_word(name, value)} at {at / NS_PER_MS:.6f} ms" for (at, name, value), _ in _few(rows))
-
-
-def _few(rows: Iterator[tuple[Nanos, str, int]]) -> Iterator[tuple[tuple[Nanos, str, int], int]]:
-    return ((row, number) for number, row in zip(range(SHOWN), rows, strict=False))
-
-
-def _of(channel: Channel) -> tuple[list[Nanos], list[int]]:
-    return channel.times, channel.values
+    since = parting.at - slack.near
+    rows = sorted(
+        (at, name, run.channels[name].values[place])
+        for channel in (parting.channel, parting.other) if channel in run.channels
+        for at, name, place in _items(channel, run.channels[channel])
+        if (at >= since if parting.other else place >= parting.place)
+    )  # fmt: skip
+    return tuple(f"{name} {_word(name, value)} at {at / NS_PER_MS:.6f} ms" for at, name, value in rows[:SHOWN])
 
 
 def _word(name: str, value: int) -> str:

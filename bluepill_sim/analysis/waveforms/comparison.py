@@ -152,7 +152,7 @@ def compare_pins(
         capture: What an analyser saw.
         wires: The pin of each channel.
         jitter_samples: By how many samples an edge may be off beside the one that it needs to be seen.
-        most_error: By which part the clocks may differ.
+        most_error: By which part the clocks may differ, above 0.
 
     Raises:
         CaptureError: There is nothing to compare: no edges, or none that agree.

@@ -31,7 +31,7 @@ from bluepill_sim.fabric.subscriptions import EDGE, HIGH, Of
 from bluepill_sim.program.functions import UNKNOWN, FunctionTable
 from bluepill_sim.program.line_table import LineTable, read_lines
 from bluepill_sim.program.static_code import StaticCode
-from bluepill_sim.stm32f103 import SRAM_BASE, SRAM_BYTES
+from bluepill_sim.stm32f103 import SRAM_BASE, SRAM_BYTES, is_in_sram
 from robot_bench.recording.run_record import RunRecord
 from robot_bench.wires.power_up import ZEROS, power_up
 from simbase.errors import UsageError
@@ -236,7 +236,7 @@ class ChipReplay:
         return [
             (symbol.name, symbol.address - SRAM_BASE, symbol.size)
             for symbol in self.board.image.symbols.symbols
-            if not symbol.is_function and symbol.size and SRAM_BASE <= symbol.address < SRAM_BASE + SRAM_BYTES
+            if not symbol.is_function and symbol.size and is_in_sram(symbol.address)
         ]
 
     # Running.

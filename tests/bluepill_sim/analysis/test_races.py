@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from bluepill_sim import BluePill
 from bluepill_sim.__main__ import run
+from bluepill_sim.analysis.interrupts import races
 from bluepill_sim.analysis.interrupts.races import (
     Channel,
     HandlerStretches,
@@ -245,3 +246,9 @@ def test_the_first_parting_is_told_with_its_channel_its_place_and_what_came_befo
 ) -> None:
     parted = parting_of(outputs(1000, **one), outputs(1000, **other), SLACK)
     assert parted == (None if found is None else OutputParting(*found))
+
+
+def test_what_two_channels_put_out_in_another_order_is_shown_each_with_its_name() -> None:
+    run = outputs(PA0=[(100, 2), (400, 1)], USART1=[(120, 65)])
+    shown = races._shown(run, OutputParting(100, "PA0", 0, "USART1"), SLACK)
+    assert [row.split(" at ")[0] for row in shown] == ["PA0 high", "USART1 'A'", "PA0 low"]

@@ -106,3 +106,24 @@ def test_a_span_that_is_none_is_not_understood(boot: Callable[..., Any], words: 
     answer = binascii.unhexlify(session.answer(b"qRcmd," + words.encode().hex().encode())).decode()
     assert "not understood" in answer
     assert machine.board.now_ns == at
+
+
+@pytest.mark.parametrize("steps", [1, 2, 3, 4])
+def test_time_passes_where_a_step_has_halted_the_core_within_a_block(make: Any, steps: int) -> None:
+    """It stood still for ever: the end of the wait was put off to the block's end, which never came."""
+    found = []
+    for waits in (False, True):
+        machine = make(START["WWDG"] + "movs r0, #0\nloop: adds r0, #1\nadds r4, r0, r4\ncmp r0, #9\nbne loop\nb stop")
+        session, board = Session(machine), machine.board
+        for _ in range(steps):
+            session._session.answer(b"s")
+        begun_ns, cycle = board.now_ns, board.cycle
+        if waits:
+            assert "0.0000" in session.wait(10_000)
+            assert (board.now_ns - begun_ns, board.cycle - cycle) == (10_000, 80)
+        board.run_for("1 ms")
+        found.append((board.register("R4"), board.pc))
+    assert found[0] == found[1]
+    resets = board.resets.copy()
+    session.wait(SPAN["WWDG"])
+    assert board.resets != resets

@@ -205,7 +205,7 @@ def test_a_part_that_stays_due_is_an_error_and_no_hang(tmp_path: Path) -> None:
         ("button,out=PA8,is_active_low=perhaps", "'perhaps' is not true or false"),
         ("leds", "the leds is connected to nothing"),
         ("ws2812", "the ws2812 is connected to nothing"),
-        ("can-node,on=CAN,data=0", "non-hexadecimal"),
+        ("can-node,on=CAN,data=0", "no data in hex"),
         ("none.py:Part", "there is no file none.py"),
     ],
 )
@@ -302,3 +302,9 @@ def test_a_part_of_the_command_line_reads_any_file_but_a_device(tmp_path: Path) 
     assert build(parse_part(f"sd-card,on=SPI1,image={tmp_path}/card.img"))
     with pytest.raises(PartError, match="/dev/zero is no file"):
         build(parse_part("sd-card,on=SPI1,image=/dev/zero"))
+
+
+def test_a_file_that_a_part_cannot_read_is_said_without_the_name_of_an_error() -> None:
+    with pytest.raises(PartError) as refused:
+        build(parse_part("sd-card,on=SPI1,image=/no/such.img"))
+    assert str(refused.value).startswith("sd-card: cannot read /no/such.img: no such file or directory")
