@@ -163,7 +163,7 @@ def ports(draw: random.Random) -> Iterator[str]:
         yield said((stick, stick.packet(), stick.speeds(400, 100), stick.speeds(1, 1)))
 
 
-def schedules(draw: random.Random) -> Iterator[str]:
+def schedules(draw: random.Random) -> Iterator[str]:  # noqa: C901 - a table of acts
     for name in ("p2dx", "p3at-sh"):
         for profile in Profile:
             robot = load_parameters(name)
