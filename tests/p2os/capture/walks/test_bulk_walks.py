@@ -69,6 +69,7 @@ def columns(draw: random.Random) -> Iterator[str]:
         Frame(bytes([kind])).to_bytes() + Frame(bytes([kind, 0, 1])).to_bytes()
         for kind in (*READERS, *SIP_KINDS, IDENTITY_KIND)
     ]
+    streams += [nested(draw) for _ in range(12)]
     for number, data in enumerate(streams):
         pauses = None if number % 3 else np.array(sorted({draw.randrange(len(data) + 1) for _ in range(3)}), np.int64)
         found = decode(data, [*Profile][number % 3], pauses=pauses)
@@ -86,6 +87,16 @@ def columns(draw: random.Random) -> Iterator[str]:
                 [each.tolist() for each in find_frames(np.frombuffer(data, np.uint8), pauses=pauses, block=size)]
             )
     yield said([table_name(bytes([kind]) + bytes(size)) for kind in range(256) for size in (0, 20, 21)])
+
+
+def nested(draw: random.Random) -> bytes:
+    """Return frames that hold others, of which some have others in their checksums; the outer ones perhaps damaged."""
+    data = Frame(draw.randbytes(3)).to_bytes()
+    for _ in range(draw.randint(1, 4)):
+        other = Frame(draw.randbytes(draw.randint(1, 9))).to_bytes()
+        data = Frame(draw.choice((b"\x77" + data, b"\x77" + data + other, b"\x77" + other + data + other))).to_bytes()
+        data = draw.choice((data, data, data[:-1] + b"\0", data[:-2] + Frame(b"\x0b").to_bytes()))
+    return data + Frame(b"\x0c").to_bytes()
 
 
 def chunks_drawn(draw: random.Random, source: Draw, count: int) -> list[Chunk]:
@@ -163,7 +174,7 @@ def passed(draw: random.Random) -> Iterator[str]:
                         for row in rows
                     ]
                 )
-        yield said([(row.at_ns, row.name, row.problem) for row in rows_of(chunks, READINGS[number % 3])])
+        yield said([(row.at_ns, row.is_sip, row.as_plain()) for row in rows_of(chunks, READINGS[number % 3])])
     for word in ("", "to", "from", "client", "robot", "c2r", "r2c", ">", "<", "x"):
         yield tried(direction_of, word)
 
@@ -415,7 +426,7 @@ def texts(draw: random.Random) -> Iterator[str]:
 def readings(draw: random.Random) -> Iterator[str]:
     """Follow what a robot says of itself and of its firmware."""
     payloads = [b"\2a\0Pioneer\0p3dx\0", b"\2a\0Pioneer\0nothing\0", b"\2", b"\2\0\0\0", StandardSip().to_frame(Profile.P2OS).payload, StandardSip(tail=(1,)).to_frame(Profile.ARCOS).payload,
-                StandardSip().to_frame(Profile.P2OS).payload[:24], b"\x90\0"]  # fmt: skip
+                StandardSip().to_frame(Profile.P2OS).payload[:24], b"\x90\0", bytes([0x90] * 40)]  # fmt: skip
     for robot in ("", "p2at"):
         for profile in (None, Profile.AROS):
             for _ in range(9):
