@@ -80,6 +80,8 @@ bench nowhere
 teleop nowhere --vel 1
 render GOLDEN/aria_p2de.jsonl --out OUT/x.odt
 """
+#: Near, beyond it, twice as far, and at the rim of the ring, m.
+FAR = (0.2, 0.34, 0.36, 0.5, 0.69, 0.71, 2.9, 3.1, 5.0)
 KEYS = [*"wasdijl,uom.qx +-=_zZk", "up", "down", "left", "right", "escape", "W"]
 
 
@@ -115,7 +117,7 @@ def dashboards(draw: random.Random) -> Iterator[str]:
             stall_left=draw.random() < 0.3, stall_right=draw.random() < 0.3, motors_enabled=draw.random() < 0.5,
             front_bumpers=tuple(draw.sample(range(6), 2)), rear_bumpers=draw.choice(((), (1,))),
             sonar=tuple(
-                echo(n, draw.uniform(-180, 180), draw.choice((0.2, 0.34, 0.36, 0.5, 0.69, 0.71, 2.9, 3.1, 5.0)), is_echo=draw.random() < 0.7) for n in range(8)
+                echo(n, draw.uniform(-180, 180), draw.choice(FAR), is_echo=draw.random() < 0.7) for n in range(8)
             ),
             compass_rad=draw.choice((None, 1.0)), state_of_charge=draw.choice((None, 40)),
             temperature_c=draw.choice((None, 31)), stop_button=draw.random() < 0.3,
