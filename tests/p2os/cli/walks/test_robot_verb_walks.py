@@ -60,8 +60,6 @@ send URL 33
 send URL CONFIG --json
 send URL VEL2 5 -5
 send URL SAY hex:1402
-monitor URL --for 500ms
-monitor URL --for 300ms --json
 info URL
 info URL --json
 scan URL
@@ -368,7 +366,7 @@ def pages(draw: random.Random) -> Iterator[str]:
         yield said(stop.state)
 
 
-def told(draw: random.Random) -> Iterator[str]:
+def notices(draw: random.Random) -> Iterator[str]:
     """Say what is at a port, what ends a hold, and what is beyond a robot."""
     with tempfile.TemporaryDirectory() as made:
         for device, text in (("ttyUSB0", "16"), ("ttyUSB1", "1"), ("ttyUSB2", "2"), ("ttyUSB3", "3"), ("ttyUSB4", "x")):
@@ -403,6 +401,6 @@ def told(draw: random.Random) -> Iterator[str]:
 
 
 TRACES: dict[str, Trace] = {
-    each.__name__: each for each in (verbs_on_robots, verbs_on_files, measured, recorded, pads, pages, told)
+    each.__name__: each for each in (verbs_on_robots, verbs_on_files, measured, recorded, pads, pages, notices)
 }
 test_what_was_approved_is_shown = judge_of(__file__, TRACES)
