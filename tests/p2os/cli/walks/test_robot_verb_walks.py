@@ -48,18 +48,13 @@ drive URL --forward 20cm
 drive URL --forward -10cm --turn 30deg --vel 100mm/s --turn-rate 20deg/s
 drive URL --vel 0.2m/s --turn-rate 10deg/s --for 500ms --json
 drive URL --vel 3m/s --turn-rate 400deg/s --for 300ms
-drive URL --turn -45deg --json
-drive URL --vel 0m/s --for 100ms
 drive URL --forward 9m
 send URL SONAR 0
-send URL ENCODER 1
 send URL ENCODER 1 --json
 send URL 250 126
 send URL ROTATE 5 --wait 200ms
-send URL 33
 send URL CONFIG --json
 send URL VEL2 5 -5
-send URL SAY hex:1402
 info URL
 info URL --json
 scan URL

@@ -90,7 +90,7 @@ def _turned(key: str, value: str) -> object:
 def aria_files(draw: random.Random) -> Iterator[str]:
     """Give each key of ARIA's file 0, less, the ends of what a measure may be, and no number."""
     for key in KEYS:
-        for value in ("0", "-1", "1", "7.3", "0.00153", "1e-6", "9e-7", "1e6", "1.1e6", "x", "nan", "inf"):
+        for value in ("0", "-1", "1", "7.3", "1e-6", "9e-7", "1e6", "1.1e6", "x"):
             yield tried(_turned, key, value)
     for more in (
         "SonarNum 3\nSonarUnit 1 5 6 7\nSonarUnit 0 1 2 3", "SonarNum 1\nSonarUnit 1 5 6 7\nSonarUnit 0 1 2 3", "SonarUnit 1 5 6", "SonarNum 0",
