@@ -103,8 +103,8 @@ class CommandRow:
         return {"-": False, "?": None}.get(self.version(profile), True)
 
     def limits(self, kind: Argument) -> tuple[int, int]:
-        """Return the range of one kind of argument, as `range` says it."""
-        return self.range if self.range is not None and kind is not Argument.NONE else WIRE_LIMITS[kind]
+        """Return the range of one kind of argument that there is, as `range` says it."""
+        return WIRE_LIMITS[kind] if self.range is None else self.range
 
     def check(self, argument: int | bytes | None) -> None:
         """Refuse an argument of another kind or out of range.

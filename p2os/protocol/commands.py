@@ -42,8 +42,8 @@ __all__ = [
 
 #: Argument type bytes (sfARGINT, sfARGNINT, sfARGSTR in the manuals).
 POSITIVE, NEGATIVE, STRING = 0x3B, 0x1B, 0x2B
-#: The longest string that fits a frame: 202 bytes less number, type and length.
-MAX_STRING_BYTES = 199
+#: The longest string that fits a frame: 202 bytes less number, type and length; data have no length.
+MAX_STRING_BYTES, MAX_DATA_BYTES = 199, 200
 MAX_MAGNITUDE = 0xFFFF
 #: A type byte and an integer, and the number of a laser after them.
 MOST_INTEGER_BYTES = 4
@@ -57,7 +57,8 @@ class Command:
 
     Args:
         number: 0 to 255; `CommandNumber` names those known.
-        argument: None for a bare command, an integer of at most 16 bits and a sign, or up to 199 bytes.
+        argument: None for a bare command, an integer of at most 16 bits and a sign, or up to 199 bytes (200 of data
+            without a length).
 
     Raises:
         LocalProtocolError: The number or the argument does not fit the wire.
@@ -71,8 +72,9 @@ class Command:
             raise LocalProtocolError(f"command {self.number} does not fit a byte (0 to 255)")
         if isinstance(self.argument, int) and abs(self.argument) > MAX_MAGNITUDE:
             raise LocalProtocolError(f"{self.name}: {self.argument} does not fit 16 bits and a sign")
-        if isinstance(self.argument, bytes) and len(self.argument) > MAX_STRING_BYTES:
-            raise LocalProtocolError(f"{self.name}: {len(self.argument)} bytes, at most {MAX_STRING_BYTES} fit a frame")
+        most = MAX_DATA_BYTES if self.number in UNCOUNTED else MAX_STRING_BYTES
+        if isinstance(self.argument, bytes) and len(self.argument) > most:
+            raise LocalProtocolError(f"{self.name}: {len(self.argument)} bytes, at most {most} fit a frame")
 
     @property
     def name(self) -> str:
@@ -126,7 +128,7 @@ class Command:
         if not data:
             return cls(frame.kind)
         if frame.kind in UNCOUNTED and (data[0] == STRING or len(data) > MOST_INTEGER_BYTES):
-            return cls(frame.kind, data[1 : 1 + MAX_STRING_BYTES])
+            return cls(frame.kind, data[1:])
         if data[0] in {POSITIVE, NEGATIVE}:
             if len(data) < 3:
                 return cls(frame.kind)

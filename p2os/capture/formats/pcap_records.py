@@ -215,7 +215,7 @@ class _PcapNg:
 def _ticks_per_s(body: bytes, order: str) -> int:
     """Return the resolution of an interface's time stamps; microseconds unless an option says otherwise."""
     place = 8
-    while place + 4 <= len(body):
+    while place + 4 < len(body):
         code, size = struct.unpack_from(order + "HH", body, place)
         if code == _IF_TSRESOL and size == 1:
             value = body[place + 4]

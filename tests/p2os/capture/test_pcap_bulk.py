@@ -161,3 +161,10 @@ def test_records_are_found_however_a_file_is_cut() -> None:
     for size in range(1, len(data)):
         blocks = [data[place : place + size] for place in range(0, len(data), size)]
         assert [p for records in read_records(blocks) for p in records.packets(0, len(records.starts))] == whole
+
+
+def test_an_interface_whose_last_option_is_cut_counts_microseconds() -> None:
+    section = block(PCAPNG_MAGIC, struct.pack("<IHHq", 0x1A2B3C4D, 1, 0, -1), "<")
+    interface = block(1, struct.pack("<HHIHH", 147, 0, 0, 9, 1), "<")
+    rows = [block(6, struct.pack("<IIIII", 0, 0, at, 2, 2) + b"\1a", "<") for at in (5, 7)]
+    assert [at_ns for at_ns, _, _ in both_ways(section + interface + b"".join(rows))] == [0, 2000]

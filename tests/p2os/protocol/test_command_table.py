@@ -16,7 +16,7 @@ def argument_of(row: CommandRow, draw: Draw) -> int | bytes | None:
         return None
     least, most = row.limits(kind)
     if kind in {Argument.STRING, Argument.DATA}:
-        return draw.bytes_of(least, min(most, 199))
+        return draw.bytes_of(least, most)
     return draw.integer(least, most)
 
 
@@ -26,7 +26,7 @@ def ends_of(row: CommandRow, kind: Argument) -> list[int | bytes | None]:
         return [None]
     least, most = row.limits(kind)
     if kind in {Argument.STRING, Argument.DATA}:
-        return [b"a" * least, b"a" * min(most, 199)]
+        return [b"a" * least, b"a" * most]
     return [least, most]
 
 
@@ -129,3 +129,8 @@ def test_a_simulator_command_has_no_length_byte() -> None:
     frame = command("SIM_SET_POSE", pose).to_frame()
     assert frame.payload == b"\xe0\x2b" + pose
     assert Command.from_frame(frame).argument == pose
+
+
+def test_data_without_a_length_byte_fills_a_frame() -> None:
+    whole = command("SIM_CTRL", bytes(range(200)))
+    assert Command.from_frame(whole.to_frame()) == whole

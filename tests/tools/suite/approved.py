@@ -32,6 +32,8 @@ from simbase.errors import P2osError
 Trace = Callable[[random.Random], Iterable[str]]
 #: Digits of a number that every machine works out alike, and below which it is 0.
 DIGITS, LEAST = 6, 1e-9
+#: What is shorter of a cause is a word of the input, which may stand in a path too.
+SHORTEST = 2
 #: Characters of a line that a test shows.
 SHOWN = 4000
 _FRACTION = re.compile(r"-?\d+\.\d{3,}(?:e[-+]?\d+)?|-?\d+e-\d+")
@@ -70,7 +72,7 @@ def refusal(error: Exception) -> str:
     words, cause = f"{type(error).__name__}: {error}", error.__cause__
     if cause is not None and not isinstance(cause, P2osError):
         for part in (str(cause), str(cause).partition(" (at ")[0], str(cause).partition(":")[0]):
-            words = words.replace(part, "…") if part else words
+            words = words.replace(part, "…") if len(part) > SHORTEST else words
     hint = getattr(error, "hint", None)
     return f"{words} ({hint})" if hint else words
 

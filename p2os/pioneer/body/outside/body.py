@@ -284,7 +284,6 @@ class OutsideBody(BodyInWorld):
 
     def __init__(self, scene: OutsideScene, parameters: RobotParameters, number: int) -> None:
         super().__init__(scene, parameters, number)
-        self._radius_m = parameters.body.wheel_diameter_m / 2
         self._numbers: tuple[float, ...] = (0.0,) * 13
         self._is_stalled = (False, False)
 

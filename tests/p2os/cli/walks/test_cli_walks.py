@@ -80,7 +80,9 @@ bench nowhere
 teleop nowhere --vel 1
 render GOLDEN/aria_p2de.jsonl --out OUT/x.odt
 """
-KEYS = [*"wasdqx +-=_zZ", "up", "down", "left", "right", "escape", "W"]
+#: Near, beyond it, twice as far, and at the rim of the ring, m.
+FAR = (0.2, 0.34, 0.36, 0.5, 0.69, 0.71, 2.9, 3.1, 5.0)
+KEYS = [*"wasdijl,uom.qx +-=_zZk", "up", "down", "left", "right", "escape", "W"]
 
 
 def verbs(draw: random.Random) -> Iterator[str]:
@@ -111,20 +113,22 @@ def dashboards(draw: random.Random) -> Iterator[str]:
     for number in range(14):
         state = replace(
             STATE, pose=RobotPose(draw.uniform(-9, 9), 0.5, draw.uniform(-4, 4)), forward_mps=draw.uniform(-2, 2),
-            turn_radps=draw.uniform(-4, 4), battery_v=draw.choice((9.0, 11.4, 11.5, 12.6)),
+            turn_radps=draw.uniform(-4, 4), battery_v=draw.choice((9.0, 11.4, 11.5, 11.6, 12.1, 12.6, 14.0)),
             stall_left=draw.random() < 0.3, stall_right=draw.random() < 0.3, motors_enabled=draw.random() < 0.5,
             front_bumpers=tuple(draw.sample(range(6), 2)), rear_bumpers=draw.choice(((), (1,))),
             sonar=tuple(
-                echo(n, draw.uniform(-180, 180), draw.uniform(0.1, 6), is_echo=draw.random() < 0.7) for n in range(8)
+                echo(n, draw.uniform(-180, 180), draw.choice(FAR), is_echo=draw.random() < 0.7) for n in range(8)
             ),
             compass_rad=draw.choice((None, 1.0)), state_of_charge=draw.choice((None, 40)),
             temperature_c=draw.choice((None, 31)), stop_button=draw.random() < 0.3,
         )  # fmt: skip
         shown: Dashboard = dashboard(None if number == 5 else state, draw.choice(list(Link)))
         for columns, rows in ((120, 40), (80, 24), (50, 12)):
-            console = Console(width=columns, height=60, record=True, file=io.StringIO())
+            console = Console(
+                width=columns, height=60, record=True, file=io.StringIO(), color_system="standard", force_terminal=True
+            )
             console.print(dashboard_of(shown, columns, rows))
-            yield console.export_text()
+            yield console.export_text(styles=True)
         yield line_of(state)
         yield str(bar(state.forward_mps, 1.5))
 
