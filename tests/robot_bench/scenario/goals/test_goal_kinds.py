@@ -73,7 +73,7 @@ def printed(*lines: tuple[int, str]) -> list[Event]:
 
 
 def test_every_kind_of_goal_is_tried() -> None:
-    from tests.robot_bench.scenario import test_goals, test_goals_on_answers, test_goals_on_steering
+    from tests.robot_bench.scenario.goals import test_goals, test_goals_on_answers, test_goals_on_steering
 
     tests = [*globals(), *vars(test_goals), *vars(test_goals_on_steering), *vars(test_goals_on_answers)]
     names = " ".join(name for name in tests if name.startswith("test_goal_"))

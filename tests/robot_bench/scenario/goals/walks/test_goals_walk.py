@@ -40,7 +40,7 @@ def numbers(draw: Random, key: str, value: Any) -> Any:  # noqa: PLR0911 - by th
             low = [draw.choice((-0.3, 0.0, 0.1)) for _ in range(2)]
             return [*low, *(one + draw.choice((0.2, 0.5, 3.0)) for one in low)]
         return value if draw.random() < 0.8 else value[::-1]
-    if isinstance(value, bool) or isinstance(value, str) or draw.random() < 0.2:
+    if isinstance(value, bool | str) or draw.random() < 0.2:
         return value
     if key in {"x_m", "y_m"} and draw.random() < 0.7:
         return draw.choice((0.0, 0.1, 0.2, 0.5))
@@ -153,7 +153,8 @@ def judged(goal: Goal, run: list[Event], draw: Random) -> Iterator[str]:
         yield f"by a saved state: {said(other)}"
     outcome = at_end.outcome
     yield f"  {told or '-'} | {outcome.met} {outcome.says!r} {said(outcome.robustness)} {outcome.unit} {at_end.is_open}"
-    yield f"  {first.has_ended_run} {said(first.missed)} {said(first.margins(end))} {said(first.finish(RunEnd(end, planned)))}"
+    found = first.missed, first.margins(end), first.finish(RunEnd(end, planned))
+    yield f"  {first.has_ended_run} {' '.join(map(said, found))}"
 
 
 def kinds(draw: Random) -> Iterator[str]:
