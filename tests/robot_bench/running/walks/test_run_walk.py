@@ -16,6 +16,7 @@ from robot_bench import adapter, run
 from robot_bench.bench import Bench, run_of
 from robot_bench.bench.board import cut_wires, pins_of
 from robot_bench.bench.waiting import EventWait, mark_of
+from robot_bench.cli.shown.fleet_hands import FleetHands
 from robot_bench.recording.recorder import Recorder
 from robot_bench.recording.summary import outcome_of
 from robot_bench.report.make import Files
@@ -176,6 +177,9 @@ def together(_draw: Random) -> Iterator[str]:
     ))  # fmt: skip
     benches = Bench.together(scenario, slice_ns=SLICE_NS)
     first, second = benches.values()
+    first.run_until("0.1 s")
+    FleetHands(benches, first.end).do("west", "drive 0.4 60")
+    FleetHands(benches, first.end).do("east", "drive -0.3 20")
     first.run_until("0.2 s")
     first.checkpoint()
     other = first.fork()
