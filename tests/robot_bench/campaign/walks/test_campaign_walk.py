@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
+from typing import Any
 from unittest import mock
 
 import typer
@@ -26,6 +27,7 @@ from robot_bench.campaign.results import PointRate, Whole
 from robot_bench.campaign.space import Space
 from robot_bench.campaign.suggestion import suggested
 from robot_bench.campaign.trial import GoalResult, HullContact, Outcome, Trial, TrialVerdict
+from robot_bench.campaign.variants import diversity
 from robot_bench.campaign.whole import begin, carry_out, points_of, resume
 from robot_bench.cli.campaigns import campaign as verb
 from robot_bench.scenario.loading import load_scenario
@@ -182,7 +184,20 @@ def shown(done: Whole) -> Iterator[str]:
 def campaigns(_draw: Random) -> Iterator[str]:
     """Conduct campaigns of several searches and budgets, one of them interrupted and gone on with."""
     before = Path.cwd()
-    with TemporaryDirectory(prefix="p2os-test-") as name, mock.patch.object(whole_module, "last_moment", moment):
+    # What stands in a trial is worked out for the page, the terminal and the summary: once is enough here.
+    scenes: dict[str, Any] = {}
+    scene = diversity._scene
+
+    def seen(one: Trial) -> Any:
+        if one.sha256 not in scenes:
+            scenes[one.sha256] = scene(one)
+        return scenes[one.sha256]
+
+    with (
+        TemporaryDirectory(prefix="p2os-test-") as name,
+        mock.patch.object(whole_module, "last_moment", moment),
+        mock.patch.object(diversity, "_scene", seen),
+    ):
         os.chdir(name)
         try:
             for number, (search, batch, runs, confirmations, budget, until) in enumerate((

@@ -229,7 +229,16 @@ new --from . --build false
 
 def refusals(_draw: Random) -> Iterator[str]:
     """Give verbs what cannot be."""
-    with in_folder() as folder:
+    loaded: dict[str, Scenario] = {}
+
+    def load(*arguments: object, **named: object) -> Scenario:
+        """Return a scenario, of each way to ask for it once: what is refused here is so whoever has loaded it."""
+        key = repr((arguments, named))
+        if key not in loaded:
+            loaded[key] = load_scenario(*arguments, **named)  # type: ignore[arg-type]  # as they come
+        return loaded[key]
+
+    with in_folder() as folder, mock.patch.object(run_verb, "load_scenario", load):
         (folder / "taken").mkdir()
         (folder / "taken" / "x.toml").write_text("x", encoding="utf-8")
         for line in REFUSED:

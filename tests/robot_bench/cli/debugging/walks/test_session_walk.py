@@ -97,14 +97,14 @@ def page(draw: Random) -> Iterator[str]:
     folder = Path(mkdtemp(prefix="p2os-test-"))
     run = controlled(folder)
     run.do("speed", speed=1.0)
-    for step in range(80):
+    for step in range(60):
         if run.session.chosen.is_over and draw.random() < 0.8:
             run.do("go", at_ns=draw.randrange(500) * NS_PER_MS)
-        if step == 45:
+        if step == 40:
             for _ in range(8):
                 run.do("fork", at_ns=300 * NS_PER_MS)
             yield from shown(run)
-        if len(run.session.state().futures) > 4 and step > 48:
+        if len(run.session.state().futures) > 4 and step > 43:
             run.do("drop", future=run.session.state().futures[-1].name)
         yield asked(draw, run, KINDS[step % len(KINDS)] if step < 30 else draw.choice(KINDS))
         yield let_go(run, draw.choice((0, 1, 3, 8)))
