@@ -13,8 +13,13 @@ from adapter_sim.masters import Master
 from adapter_sim.pinout import load_pinout
 from p2os.robots.parameters import load_parameters
 from robot_bench import adapter, run
-from robot_bench.bench import Bench, run_of
+from robot_bench.bench.bench import Bench, run_of
 from robot_bench.bench.board import cut_wires, pins_of
+from robot_bench.bench.expectations import Expectations
+from robot_bench.bench.far_end import FarEnd
+from robot_bench.bench.hand_driven_body import HandDrivenBody
+from robot_bench.bench.interventions import Interventions
+from robot_bench.bench.robot_run import RobotRun
 from robot_bench.bench.waiting import EventWait, mark_of
 from robot_bench.cli.shown.fleet_hands import FleetHands
 from robot_bench.recording.recorder import Recorder
@@ -29,7 +34,7 @@ from tests.robot_bench.firmware.hurried import hurried
 from tests.tools.suite.approved import judge_of, said, tried
 
 #: What it is walked through with; imported, so that it stands near these.
-PARTS = (Recorder, RunLoop, EventWait)
+PARTS = (Recorder, RunLoop, EventWait, Expectations, FarEnd, HandDrivenBody, Interventions, RobotRun)
 SLICE_NS = 10 * NS_PER_MS
 HEAD = """
 firmware = "{firmware}"
