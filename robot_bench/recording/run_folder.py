@@ -88,6 +88,22 @@ def make_next_folder(name: str, parent: Path = RUNS) -> Path:
         ) from error
 
 
+@contextlib.contextmanager
+def used_folder(out: Path | None, name: str, parent: Path = RUNS) -> Iterator[Path]:
+    """Yield the folder that was named, or the next; one that holds nothing where the block fails is taken away.
+
+    Raises:
+        UsageError: As of `make_next_folder`.
+    """
+    folder = out or make_next_folder(name, parent)
+    try:
+        yield folder
+    except BaseException:
+        with contextlib.suppress(OSError):
+            folder.rmdir()
+        raise
+
+
 def remove_run(folder: Path) -> None:
     """Remove what a run has left, and its folder where that holds nothing else.
 

@@ -118,6 +118,8 @@ def read_variables(folder: Path) -> list[VariableRecord]:
 
 def _take(found: list[VariableRecord], entry: Json) -> None:
     place, times, values = entry["n"], cast("list[int]", entry["t"]), cast("list[float | None]", entry["v"])
+    if not isinstance(times, list) or not isinstance(values, list):
+        raise ValueError("no rows")  # noqa: TRY004 - a damaged line, as any other
     if type(place) is not int or not 0 <= place < len(found) or len(times) != len(values):
         raise ValueError("no rows of a variable")
     if not all(type(t) is int and 0 <= t <= LAST_NS for t in times):

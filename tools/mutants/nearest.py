@@ -47,6 +47,7 @@ TESTS_OF_C = {
         "tests/bluepill_sim/core/test_core_parts.py", "tests/bluepill_sim/native"),
     "bluepill_sim/extension/source": ("tests/bluepill_sim/fabric", "tests/bluepill_sim/native", "tests/bluepill_sim"),
     "robot_bench/wires": ("tests/robot_bench/wires",),
+    "robot_bench/direct": ("tests/robot_bench/direct",),
     "adapter_fw/core/app": ("tests/adapter_fw/test_units.py", "tests/adapter_fw/test_shell.py"),
     "adapter_fw/core": ("tests/adapter_fw/walks", "tests/adapter_fw/test_sameness.py", "tests/adapter_fw/test_units.py",
                         "tests/adapter_sim/test_settings.py", "tests/adapter_fw/test_safety.py",

@@ -29,7 +29,7 @@ from robot_bench.campaign.workers.processes import Processes
 from robot_bench.cli.progress import RunDisplay, counting_bar
 from robot_bench.cli.run import refuse
 from robot_bench.cli.workers import Jobs, core_count
-from robot_bench.recording.run_folder import make_next_folder
+from robot_bench.recording.run_folder import used_folder
 from robot_bench.scenario.loading import load_scenario
 from simbase.command_line.program import EXIT_INTERRUPTED
 from simbase.errors import UsageError, nearest
@@ -135,9 +135,9 @@ def campaign(
         other = Other.of(folder)
     elif len(asked) == 1:
         file = Path(asked[0])
-        folder = out or make_next_folder(file.stem, CAMPAIGNS)
-        other = None if against is None else Other.read(against)
-        found = begin(file, folder, firmware=firmware, overrides=overrides, other=other, trust=said(trust))
+        with used_folder(out, file.stem, CAMPAIGNS) as folder:
+            other = None if against is None else Other.read(against)
+            found = begin(file, folder, firmware=firmware, overrides=overrides, other=other, trust=said(trust))
     else:
         raise UsageError("which campaign?", hint="p2os campaign FILE, or p2os campaign new SCENARIO")
     with RunDisplay(is_shown=False) as display:

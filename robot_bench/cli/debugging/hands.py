@@ -28,7 +28,7 @@ def hand_of(words: str, at: Nanos, bench: Bench) -> Hand:
     do, keys = meant_by(words)
     scenario = bench.scenario
     wires = None if scenario.own_robot is None else scenario.own_robot.wires
-    if not scenario.has_robot and do not in BOARD_HANDS:
+    if not scenario.has_robot and (do not in BOARD_HANDS or keys.get("what") == WHEELS):
         raise UsageError("a board by itself has neither robot nor world", hint="pin, volts, type, let go")
     found = hand_at(at, do, keys, scenario.parameters, "hand", wires)
     if found.doing.faults and bench.parts.controller is None:

@@ -1,8 +1,7 @@
 """`p2os validate`: the bench against what it claims, in every variant, as figures with bounds."""
 
-import contextlib
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -33,7 +32,7 @@ from robot_bench.experiments.validation.trials import (
     run_trials,
     variants,
 )
-from robot_bench.recording.run_folder import RUNS, make_next_folder
+from robot_bench.recording.run_folder import used_folder
 from robot_bench.run import RunResult
 from robot_bench.scenario.included_files import Setting, read_setting
 from robot_bench.scenario.options import MODES
@@ -121,7 +120,7 @@ def validate(
     chosen_variants = variants(mode or (), body or ())
     refuse(chosen, chosen_variants if port is None else [], settings, world or ())
     try:
-        with _report_folder(out) as folder:
+        with used_folder(out, "validation") as folder:
             if port is None:
                 results = _run_all(
                     chosen, chosen_variants, folder, settings, worlds=world or (),
@@ -139,18 +138,6 @@ def validate(
         _print(results, folder)
     if not all(result.passed for result in results):
         raise typer.Exit(1)
-
-
-@contextlib.contextmanager
-def _report_folder(out: Path | None) -> Iterator[Path]:
-    """Yield the folder that the report goes to; one that holds nothing where the block fails is taken away."""
-    folder = out or make_next_folder("validation", RUNS)
-    try:
-        yield folder
-    except BaseException:
-        with contextlib.suppress(OSError):
-            folder.rmdir()
-        raise
 
 
 def _chosen(names: Sequence[str], modes: Sequence[str]) -> list[Experiment]:

@@ -184,14 +184,14 @@ class ControlMachine(RuleBasedStateMachine):
         assert all(0 <= one.head_ns <= one.end_ns for one in state.futures)
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_a_run_stays_what_it_is_whatever_is_asked() -> None:
     bench = Bench(scenario(DURATION_S))
     bench.run_until(bench.end)
     bench.finish()
     ControlMachine.alone = bench.trace.sha256
     ControlMachine.TestCase.settings = settings(
-        max_examples=4, stateful_step_count=8,
+        max_examples=30, stateful_step_count=12,
         suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much],
     )  # fmt: skip
     ControlMachine.TestCase().runTest()

@@ -102,7 +102,7 @@ def test_a_run_that_is_only_let_go_is_the_run_alone(run: Controlled, alone: str)
     assert hash_at_end(run) == alone
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_steps_by_every_unit_and_back_change_nothing(run: Controlled, alone: str) -> None:
     at(run, 1.0)
     for unit in ("instruction", "line", "edge", "packet", "event", "millisecond"):

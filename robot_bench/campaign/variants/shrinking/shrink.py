@@ -195,7 +195,7 @@ def _shrunk(trial: Trial, failure: Failure, judge: Judge, budget: int) -> Shrunk
 
 def _as_meant(small: Trial, trial: Trial, quick: Sequence[Setting]) -> Trial:
     """Return a small trial with the values of the original where `quick` has others."""
-    keys = {key for key, _ in quick}
+    keys = dict.fromkeys(key for key, _ in quick)
     table = {key: value for key, value in small.table.items() if key not in keys}
     return replace(small, table=table | {key: trial.table[key] for key in keys if key in trial.table})
 

@@ -24,7 +24,7 @@ from robot_bench.scenario.loading import load_scenario
 from simbase.errors import UsageError
 from tests.robot_bench.recording.records import S, pose
 
-ROOT = Path(__file__).resolve().parents[3]
+ROOT = Path(__file__).resolve().parents[4]
 MS = 10**6
 UM = 1_000_000
 
@@ -73,12 +73,12 @@ def printed(*lines: tuple[int, str]) -> list[Event]:
 
 
 def test_every_kind_of_goal_is_tried() -> None:
-    from tests.robot_bench.scenario import test_goals, test_goals_on_answers, test_goals_on_steering
+    from tests.robot_bench.scenario.goals import test_goals, test_goals_on_answers, test_goals_on_steering
 
     tests = [*globals(), *vars(test_goals), *vars(test_goals_on_steering), *vars(test_goals_on_answers)]
     names = " ".join(name for name in tests if name.startswith("test_goal_"))
     missing = [kind for kind in every_kind() if kind not in names]
-    assert missing == [], "write test_goal_KIND_... in tests/robot_bench/scenario/test_goals.py"
+    assert missing == [], "write test_goal_KIND_... in tests/robot_bench/scenario/goals/test_goals.py"
 
 
 @pytest.mark.parametrize(("t", "met"), [(2 * S - 1, True), (2 * S, True), (2 * S + 1, False)])

@@ -8,7 +8,7 @@ from p2os.errors import ScenarioError
 from robot_bench.events.kinds import Event, Ranges
 from robot_bench.scenario.goals.judging import load_goal
 from tests.robot_bench.recording.records import S
-from tests.robot_bench.scenario.test_goal_kinds import MS, at, outcome
+from tests.robot_bench.scenario.goals.test_goal_kinds import MS, at, outcome
 
 FREE, NEAR, BETWEEN = 2000, 499, 500
 

@@ -197,7 +197,7 @@ def still() -> RunRecord:
 def test_every_kind_of_goal_is_held_so_far_or_decided_once() -> None:
     wrong = {*HOLDS_SO_FAR} ^ DECIDED_ONCE ^ {*every_kind()}
     assert wrong == set(), (
-        "give it a row of HOLDS_SO_FAR, or of DECIDED_ONCE, in tests/robot_bench/scenario/test_goals.py"
+        "give it a row of HOLDS_SO_FAR, or of DECIDED_ONCE, in tests/robot_bench/scenario/goals/test_goals.py"
     )
 
 

@@ -13,7 +13,7 @@ from robot_bench.scenario.goals.judging import load_goal
 from robot_bench.scenario.goals.watch import GoalOutcome
 from simbase.errors import LONGEST_SHOWN
 from tests.robot_bench.recording.records import S
-from tests.robot_bench.scenario.test_goal_kinds import MS, at, outcome
+from tests.robot_bench.scenario.goals.test_goal_kinds import MS, at, outcome
 
 PINOUT = load_pinout()
 

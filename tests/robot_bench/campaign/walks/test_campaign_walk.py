@@ -1,0 +1,328 @@
+"""Campaigns whose runs are made up: what is asked, found, printed, written and shown of them, to the last figure."""
+
+import contextlib
+import io
+import itertools
+import json
+import os
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from random import Random
+from tempfile import TemporaryDirectory
+from typing import Any
+from unittest import mock
+
+import typer
+from pyarrow import parquet
+
+from robot_bench.campaign import whole as whole_module
+from robot_bench.campaign.campaign_file import CampaignTable, campaign_schema, parse_campaign
+from robot_bench.campaign.conduct import CampaignProgress
+from robot_bench.campaign.last_moment import LastMoment
+from robot_bench.campaign.margin import goal_margin, margin
+from robot_bench.campaign.pages import page
+from robot_bench.campaign.pages.comment import _plain, write_comment
+from robot_bench.campaign.results import PointRate, Whole
+from robot_bench.campaign.space import Space
+from robot_bench.campaign.suggestion import suggested
+from robot_bench.campaign.trial import GoalResult, HullContact, Outcome, Trial, TrialVerdict
+from robot_bench.campaign.variants import diversity
+from robot_bench.campaign.whole import begin, carry_out, points_of, resume
+from robot_bench.cli.campaigns import campaign as verb
+from robot_bench.scenario.loading import load_scenario
+from simbase.errors import P2osError
+from tests.robot_bench.campaign.test_campaign import Shuffled
+from tests.tools.suite.approved import judge_of, rounded, said, tried
+
+SCENARIO = """
+firmware = "dodge.elf"
+world = "room"
+body = "kinematic"
+duration_s = 5
+[start]
+x_m = 0.5
+y_m = 0.0
+heading_deg = 0.0
+[[obstacle]]
+at_s = 0
+op = "place"
+name = "box"
+shape = "box"
+length_m = 0.4
+width_m = 0.2
+height_m = 0.5
+x_m = 2.0
+y_m = 1.0
+heading_deg = 30.0
+[[goal]]
+kind = "no_collision"
+[[goal]]
+kind = "min_distance"
+distance_m = 1.0
+"""
+FILE = """
+scenario = "mine.toml"
+search = "{search}"
+batch = {batch}
+seed = 5
+near_misses = 2
+description = "made up"
+[budget]
+runs = {runs}
+confirmations = {confirmations}
+{budget}
+[cheap]
+mode = "adapter"
+duration_s = 4
+[full]
+duration_s = 5
+[vary]
+start.heading_deg = {{ from = 0, to = 350, step = 10 }}
+threshold_m = [0.4, 0.6, 0.75]
+start.x_m = {{ from = 0.3, to = 0.7 }}
+[[draw]]
+kind = "post"
+count = {{ from = 0, to = 2 }}
+[[draw]]
+kind = "wall"
+name = "wall behind"
+count = {{ from = 0, to = 1 }}
+[[disturb]]
+fault = "sonar-stuck {{sonar}} {{range_m}}"
+sonar = {{ from = 1, to = 8 }}
+range_m = {{ from = 0.2, to = 3.0 }}
+at_s = {{ from = 1.0, to = 2.0 }}
+for_s = 0.5
+share = 0.5
+[[reach]]
+text = "CRUISE"
+[[reach]]
+text = "never"
+"""
+HASH = re.compile(r"\b[0-9a-f]{12,64}\b")
+
+
+def made_up(trial: Trial) -> Outcome:
+    """Return an outcome of any kind, that depends on what varies in a trial alone."""
+    key = json.dumps([trial.seed, {name: trial.table.get(name) for name in (
+        "start", "threshold_m", "obstacle", "fault")}], sort_keys=True, default=str)  # fmt: skip
+    draw, alike = Random(f"{key} {trial.table['duration_s']}"), Random(key)  # both fidelities mostly agree
+    if draw.random() < 0.08:
+        return Outcome(verdict=TrialVerdict.ERROR, failures=(draw.choice(("too slow", "it ended")),))
+    failed = alike.random() < 0.35 or draw.random() < 0.05
+    goals = tuple(
+        GoalResult(
+            kind=kind, wanted=f"{kind} holds", met=None if draw.random() < 0.1 else not (failed and number == 0),
+            says=f"{kind} said", robustness=None if draw.random() < 0.3 else draw.uniform(-1.2, 3.0), unit=unit,
+            robot="one" * (number % 2), is_excused=number == 2 and draw.random() < 0.3,
+        )
+        for number, (kind, unit) in enumerate((
+            (draw.choice(("no_collision", "reach")), "m"), ("answers", "s"), ("steers", "deg"), ("no_collision", "")))
+    )  # fmt: skip
+    place = draw.choice(("front left", "rear", ""))
+    hits = (HullContact(t=10**9, what="'box'", part=place, x_m=1.0, y_m=draw.uniform(-1, 1)),) * (
+        failed and place != ""
+    )
+    states = draw.sample(("ready", "CRUISE #", "TURN", "BACK"), 3)
+    return Outcome(
+        verdict=TrialVerdict.FAILED if failed else TrialVerdict.PASSED, goals=goals, hits=hits,
+        failures=(f"{goals[0].kind}: {goals[0].says}",) * failed, virtual_ns=4 * 10**9 + draw.randrange(10**9),
+        sha256=f"{draw.randrange(40):08x}", distance_m=draw.random(), clearance_m=draw.choice((None, 0.2, 1.4)),
+        way_mm=tuple((100 * n, draw.randrange(-900, 900)) for n in range(draw.choice((0, 1, 4)))),
+        died="hard fault" * (draw.random() < 0.05), blocks=frozenset(draw.sample(range(30), 5)),
+        ways=frozenset(draw.sample(range(40), 4)), lines=frozenset(states),
+        transitions=frozenset(map(" → ".join, itertools.pairwise(states))),
+        happened=frozenset(words for words in trial.looks_for if "never" not in words and draw.random() < 0.3),
+    )  # fmt: skip
+
+
+def moment(trial: Trial, *_: object) -> LastMoment:
+    number = Random(str(trial.table.get("start"))).randrange(4)
+    return LastMoment(
+        failure="no_collision: it hit", failed_ns=3_210_000_000, avoidable_ns=None if number == 0 else 2 * 10**9,
+        place=None if number == 1 else (1.25, -0.5, 90.0), printed="CRUISE 3" * (number != 2),
+    )  # fmt: skip
+
+
+def printed(done: Whole, *, json_output: bool) -> Iterator[str]:
+    out, err = io.StringIO(), io.StringIO()
+    ended = 0
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        try:
+            verb.tell(done, None, json_output=json_output)
+        except typer.Exit as error:
+            ended = error.exit_code
+    yield from (HASH.sub("SHA", rounded(line)) for line in [*out.getvalue().splitlines(), *err.getvalue().splitlines()])
+    yield f"= {ended}"
+
+
+def shown(done: Whole) -> Iterator[str]:
+    """Go through all that a campaign that is done shows."""
+    for row in done.progress.rows:
+        yield said([row.number, row.finding, row.proposal.point, row.proposal.values, row.proposal.obstacles,
+                    row.proposal.faults, row.new, row.is_drawn])  # fmt: skip
+        yield said([(run.stage, run.outcome.sha256, run.outcome.verdict, run.cpu_s, run.margin) for run in row.runs])
+    yield from printed(done, json_output=False)
+    if done.was_interrupted or done.campaign.batch == 4:
+        yield from printed(done, json_output=True)
+    for section in page._sections(done):
+        for block in (section.title, section.note, *section.blocks):
+            yield HASH.sub("SHA", said(block))[:6000]
+    yield page._why(done)
+    text = (done.folder / "report.html").read_text(encoding="utf-8")
+    yield HASH.sub("SHA", " ".join(re.findall(r'"(?:lead|verdict|standing|footer|title)": ?"[^"]*"', text)[:6]))
+    for part in sorted((done.folder / "results").iterdir()):
+        for entry in parquet.read_table(part).to_pylist():
+            left_out = ("p2os", "trial_sha256", "firmware_sha256")
+            yield f"{part.name} {said({key: value for key, value in entry.items() if key not in left_out})}"
+    for folder in sorted((done.folder / "failures").glob("*")):
+        yield f"{folder.name} {said(sorted(path.name for path in folder.iterdir()))}"
+        yield HASH.sub("SHA", (folder / "mine.toml").read_text(encoding="utf-8"))
+
+
+def campaigns(_draw: Random) -> Iterator[str]:
+    """Conduct campaigns of several searches and budgets, one of them interrupted and gone on with."""
+    before = Path.cwd()
+    # What stands in a trial is worked out for the page, the terminal and the summary: once is enough here.
+    scenes: dict[str, Any] = {}
+    scene = diversity._scene
+
+    def seen(one: Trial) -> Any:
+        if one.sha256 not in scenes:
+            scenes[one.sha256] = scene(one)
+        return scenes[one.sha256]
+
+    with (
+        TemporaryDirectory(prefix="p2os-test-") as name,
+        mock.patch.object(whole_module, "last_moment", moment),
+        mock.patch.object(diversity, "_scene", seen),
+    ):
+        os.chdir(name)
+        try:
+            for number, (search, batch, runs, confirmations, budget, until) in enumerate((
+                ("random", 4, 22, 7, "", 10**6), ("grid", 5, 10, 20, "virtual_hours = 0.008", 10**6),
+                ("random", 3, 12, 2, "minutes = 1.5", 10**6), ("random", 4, 8, 3, "", 9),
+            )):  # fmt: skip
+                place = Path(f"c{number}")
+                place.mkdir()
+                (place / "mine.toml").write_text(SCENARIO, encoding="utf-8")
+                text = FILE.format(search=search, batch=batch, runs=runs, confirmations=confirmations, budget=budget)
+                (place / "camp.toml").write_text(text, encoding="utf-8")
+                campaign = begin(
+                    place / "camp.toml", place / "kept", firmware=None, overrides={"budget": {"runs": runs}}
+                )
+                ticks = itertools.count(0, 60 * 10**9)
+                told: list[tuple[int, int]] = []
+
+                def note(progress: CampaignProgress, told: list[tuple[int, int]] = told) -> None:
+                    told.append((progress.runs, progress.answered))
+
+                for last in (until, 10**6):
+                    workers = Shuffled(number, last, made_up)
+                    done = carry_out(
+                        campaign, place / "kept", workers, clock=lambda ticks=ticks: next(ticks), on_run=note
+                    )
+                    yield said([search, told[-1:], workers.count, sum(workers.anew), done.was_interrupted])
+                    if not done.was_interrupted:
+                        break
+                    campaign = resume(place / "kept")
+                yield from shown(done)
+                rows = points_of(place / "kept")
+                yield HASH.sub("SHA", write_comment(place / "kept", campaign, rows, place / "c.md", url="http://x/"))
+                yield said(sorted(path.name for path in place.rglob("*.svg")))
+                yield said([row.finding for row in rows] == [row.finding for row in done.progress.rows])
+        finally:
+            os.chdir(before)
+
+
+def files(_draw: Random) -> Iterator[str]:
+    """Read campaign files that are wrong in one key, and write those that scenarios suggest."""
+    yield said(campaign_schema())
+    changes = (
+        ("batch = 4", "batch = 0"),
+        ("seed = 5", "seed = -1"),
+        ("near_misses = 2", "near_misses = -1"),
+        ("runs = 9", "runs = 0"),
+        ("runs = 9", "runs = 1.5"),
+        ("confirmations = 3", "confirmations = -1"),
+        ('search = "random"', 'search = "luck"'),
+        ('"adapter"', '"both"'),
+        ('"adapter"', '"direct"'),
+        ("to = 350", "to = -1"),
+        ("step = 10", "step = 0"),
+        ("step = 10", "step = 1e-9"),
+        ("[0.4, 0.6, 0.75]", "[]"),
+        ("[0.4, 0.6, 0.75]", "[-1]"),
+        ("threshold_m", "threshold"),
+        ('kind = "post"', 'kind = "tower"'),
+        ("to = 2 }", "to = -2 }"),
+        ("to = 2 }", "to = 2000 }"),
+        ("share = 0.5", "share = 1.5"),
+        ("sonar = {", "other = {"),
+        ("to = 8 }", "to = 99 }"),
+        ("swarm", "x"),
+        ("for_s = 0.5", "for_s = 0"),
+        ("sonar-stuck", "sonar-lost"),
+        ('kind = "wall"', 'kind = "gap"'),
+        ('text = "CRUISE"', "text = 3"),
+        ('text = "CRUISE"', 'event = "robot"'),
+        ('"mine.toml"', '"gone.toml"'),
+        ("duration_s = 4\n", "duration_s = 0\n"),
+        ("[full]", "[full]\nworlds = 1"),
+        ("from = 0.3, to = 0.7", "from = 0.3"),
+        ("description", "words"),
+        ("", ""),
+    )
+    with TemporaryDirectory(prefix="p2os-test-") as name:
+        file = Path(name, "camp.toml")
+        (Path(name) / "mine.toml").write_text(SCENARIO, encoding="utf-8")
+        whole = FILE.format(search="random", batch=4, runs=9, confirmations=3, budget="minutes = 5")
+        for one, other in changes:
+            try:
+                found = parse_campaign(whole.replace(one, other, 1), file, firmware=None)
+            except P2osError as error:
+                yield f"{other}: {error} ({error.hint})".replace(name, "HERE")
+                continue
+            yield said([other, found.search, found.batch, found.seed, found.budget, found.limits, found.near_misses])
+            space = Space(found)
+            yield said([space.extent, [(one.name, one.span) for one in space.dimensions]])
+            for share in (0.0, 0.13, 0.5, 0.77, 0.999):
+                proposal = space.proposal(tuple((share + 0.37 * n) % 1 for n in range(len(space.dimensions))))
+                yield said([proposal.point, proposal.values, proposal.obstacles, proposal.faults])
+                yield said(space.point(proposal.values) if share else ())
+    for name in ("motors", "two-dodge"):
+        for keys in ({}, {"runs": 7, "search": "grid", "seed": 3, "firmware": "mine.elf"}):
+            text = suggested(load_scenario(name), name, "c.toml", keys)
+            yield from (
+                line
+                for line in text.splitlines()
+                if (not line.startswith("body") and not keys) or "mine" in line or "grid" in line or "7" in line
+            )
+    yield said(CampaignTable)
+
+
+def figures(draw: Random) -> Iterator[str]:
+    """Work out margins, rates, and words of the journal and of Markdown."""
+    for unit in ("m", "s", "deg", "°", "m/s", "m/s²", "J", "", "x"):
+        for by in (None, -2.0, -1e-4, 0.0, 0.4, 2.0):
+            for met in (True, False, None):
+                goal = GoalResult(kind=draw.choice(("no_collision", "reach")), wanted="", met=met, says="", unit=unit,
+                                  robustness=by, is_excused=draw.random() < 0.2)  # fmt: skip
+                outcome = Outcome(verdict=draw.choice(list(TrialVerdict)), goals=(goal,) * draw.randint(0, 1),
+                                  clearance_m=draw.choice((None, 0.3)), died="x" * draw.randint(0, 1))  # fmt: skip
+                yield said([unit, by, met, goal.kind, goal_margin(goal, outcome), margin(outcome)])
+    for count, of in ((0, 1), (1, 1), (3, 10), (50, 100)):
+        yield f"{PointRate(count, of)} {said(PointRate(count, of).bounds)}"
+    left_out = {1: "a", 2: "a", 3: "b", 7: "a", 9: "a", 10: "a"}
+    yield said(CampaignProgress(left_out=left_out).left_out_words())
+    yield said([_plain(text) for text in ("a_b*c", "`x_y` a_b", "`x", "a\nb", "``", "[l](u)")])
+    for number in range(4):
+        start = next(n for n in range(99) if Random(str({"n": n})).randrange(4) == number)
+        yield moment(Trial(name="", table={"start": {"n": start}}, files={}, seed=0)).words
+    yield said(tried(page._correlation, [(1.0, 2.0), (2.0, 4.0), (3.0, 5.0)]))
+    yield said([page._correlation([(1.0, 1.0), (1.0, 2.0)]), page._last(None)])
+
+
+TRACES = {"campaigns": campaigns, "files": files, "figures": figures}
+test_what_campaigns_come_to_is_what_was_approved = judge_of(__file__, TRACES)

@@ -1,0 +1,240 @@
+"""What pages are shown of runs: panels of the chip, what hands may do and have done, live runs and fleets as asked."""
+
+import contextlib
+import os
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from random import Random
+from tempfile import TemporaryDirectory
+
+from bluepill_sim.board import BluePill
+from p2os.view.header import PageSection, PageText
+from p2os.view.recording import ViewRecording
+from p2os.view.run_control import RunCommand
+from p2os.view.targets import ViewPanel
+from robot_bench.bench import Bench
+from robot_bench.cli.debugging.hands import hand_of
+from robot_bench.cli.shown import chip_panels, saved_hands
+from robot_bench.cli.shown.fleet_hands import FleetHands
+from robot_bench.cli.shown.live_fleet import LiveFleet
+from robot_bench.cli.shown.live_run import LiveRun
+from robot_bench.cli.shown.looked_panels import LOOK_NS, MOST_LOOKS, LookedPanels
+from robot_bench.cli.shown.offered_hands import hands_of
+from robot_bench.cli.shown.targets import run_target, scenario_target
+from robot_bench.scenario.loading import load_scenario
+from tests.robot_bench.firmware.hurried import hurried_scenario
+from tests.tools.suite.approved import judge_of, said, tried
+
+MS = 1_000_000
+GOAL = '[[goal]]\nkind = "min_distance"\ndistance_m = 1\n[start]\nx_m = 1\ny_m = 0\nheading_deg = 0\n'
+SCENARIO = hurried_scenario("dodge", 1, mode="direct", body="kinematic", duration_s=0.3)
+ASKED = (
+    RunCommand(do="pause"),
+    RunCommand(do="step", unit="millisecond"),
+    RunCommand(do="go", at_ns=100 * MS),
+    RunCommand(do="watch", words="ticks"),
+    RunCommand(do="watch", words="nothing"),
+    RunCommand(do="hand", words="carry robot to 0.3 0.2"),
+    RunCommand(do="run"),
+    RunCommand(do="fork", words="pin PA0 high"),
+    RunCommand(do="drive", forward_mps=0.9, turn_dps=-200.0),
+    RunCommand(do="run"),
+    RunCommand(do="stop"),
+    RunCommand(do="halt_at", words="pin motor1_comm1 changes"),
+    RunCommand(do="save", words="scenario"),
+    RunCommand(do="compare", future="run"),
+    RunCommand(do="choose", future="run"),
+    RunCommand(do="drop", future="fork 1"),
+    RunCommand(do="speed", speed=0.0),
+    RunCommand(do="run"),
+    RunCommand(do="run"),
+)
+FLEET = (
+    RunCommand(do="hand", robot="east", words="drive 0.2 30"),
+    RunCommand(do="hand", robot="none", words="drive 0 0"),
+    RunCommand(do="hand", words="press stop-button"),
+    RunCommand(do="drive", robot="west", forward_mps=0.9),
+    RunCommand(do="drive", robot="east", forward_mps=-0.2, turn_dps=200.0),
+    RunCommand(do="stop"),
+    RunCommand(do="hand", robot="east", words="let go wheels"),
+    RunCommand(do="pause"),
+    RunCommand(do="save", words="test"),
+    RunCommand(do="save", words="book"),
+    RunCommand(do="step", unit="millisecond"),
+    RunCommand(do="step", unit="event"),
+    RunCommand(do="run", at_ns=0),
+    RunCommand(do="back", unit="event"),
+    RunCommand(do="speed", speed=4.0),
+    RunCommand(do="run"),
+)
+
+
+def panels(_draw: Random) -> Iterator[str]:
+    """Look at each panel of a chip, with each of its choices, at three times."""
+    bench = Bench(SCENARIO, slice_ns=10 * MS)
+    board = bench.chip
+    assert isinstance(board, BluePill)
+    made = [make(board) for make in (chip_panels.program_panel, chip_panels.registers_panel, chip_panels.board_panel)]
+    yield said([make(3) for make in (chip_panels.program_panel, chip_panels.registers_panel, chip_panels.board_panel)])
+    yield said([chip_panels._frequency(hz) for hz in (0, 1, 999_999, 1_000_000, 72_000_000, 8_123_456)])
+    yield said([chip_panels._field("A", value) for value in (0, 9, 10)])
+    for at in (0, 5, 120):
+        bench.run_until(at * MS)
+        for panel in made:
+            assert panel is not None
+            yield said([panel.name, panel.title, panel.header])
+            for choice in (*panel.choices, "none", "") if at != 5 else panel.choices[:3]:
+                for section in panel.look(choice):
+                    yield f"{choice} {section.title} {section.note}"
+                    yield from (said(block) for block in section.blocks)
+
+
+def hands(_draw: Random) -> Iterator[str]:
+    """Offer what hands can do, and write down what they have done."""
+    for name, options in (("dodge", {}), ("dodge", {"mode": "direct"}), ("rover", {}), ("two-dodge", {})):
+        scenario = load_scenario(name).with_options(**options)
+        for one in (scenario, *scenario.programmed):
+            yield said([name, options, hands_of(one)])
+    bench = Bench(hurried_scenario("dodge", 1, body="kinematic", duration_s=0.3))
+    done = [hand_of(words, (n + 1) * 10**7 + 7, bench) for n, words in enumerate((
+        "drive 0.2 30", "press stop-button", "pin PA0 high", "volts PA1 1.5", "type usart1 go", "move crate to 1 1",
+        "let go wheels", "carry robot to 0.1 0.2"))]  # fmt: skip
+    before = Path.cwd()
+    with TemporaryDirectory(prefix="p2os-test-") as name:
+        os.chdir(name)
+        try:
+            folder = Path(name, "runs", "my run-1")
+            folder.mkdir(parents=True)
+            file = Path(name, "mine.toml")
+            head = 'firmware = "dodge.elf"\nworld = "arena"\nbody = "kinematic"\nseeds = "0-3"\nduration_s = 9\n'
+            for text in (
+                "",
+                '[[goal]]\nkind = "min_distance"\ndistance_m = 1\n[start]\nx_m = 1\ny_m = 0\nheading_deg = 0\n',
+            ):
+                file.write_text(head + text, encoding="utf-8")
+                scenario = load_scenario(str(file)).with_options(seed=4, usart_baud=9600, record="spi1")
+                yield saved_hands.scenario_text(scenario, done, folder).replace(name, "HERE")
+            for kind, future in (("scenario", ""), ("test", "fork 1")):
+                yield saved_hands.saved_beside(scenario, done, folder, kind, future).replace(name, "HERE")
+            yield said(sorted(path.name for path in folder.parent.iterdir()))
+            yield tried(saved_hands.saved_beside, scenario, done, None, "test")
+            yield tried(saved_hands.scenario_text, replace(scenario, path=None), done, folder)
+            yield said([tried(run_target, one) for one in ("none", name)])
+            yield said([tried(scenario_target, one) for one in ("none", "gone.toml")])
+        finally:
+            os.chdir(before)
+    yield saved_hands.pytest_text("a b-c.toml", 1_500_000_000)
+    yield saved_hands.scenario_text(load_scenario("two-dodge"), [replace(done[0], robot="west")], Path("/x"))
+
+
+def rows(shown: ViewRecording) -> Iterator[str]:
+    yield said(
+        [shown.header.title, shown.header.lead, shown.header.is_live, shown.header.robots, sorted(shown.dropped)]
+    )
+    for track in shown.tracks:
+        yield said([track.header.source, track.header.name, len(track.times), *track.times[:3], *track.times[-2:]])
+
+
+def live(_draw: Random) -> Iterator[str]:
+    """Ask a live run for all that a page may ask for, a command at a look of its clock."""
+    states: list[str] = []
+    with TemporaryDirectory(prefix="p2os-test-"):
+        run, left, now = LiveRun(SCENARIO, speed=0.5, variables=["head"]), [*ASKED], 0
+
+        def clock() -> int:
+            nonlocal now
+            now += LOOK_NS // 3
+            for panel, choice in (("program", "next line"), ("chip", "NVIC"), ("none", "")):
+                found = run.look(panel, choice)
+                states.append(f"{panel} {None if found is None else (found.at_ns, len(said(found)))}")
+            if left and now % (LOOK_NS // 3 * 2) == 0:
+                run.offer(left.pop(0))
+            return now
+
+        def show(state: object) -> None:
+            states.append(said(state))
+
+        run._clock, run._show = clock, show  # type: ignore[method-assign,assignment]  # each of them
+        run.drive(Bench(SCENARIO, slice_ns=10 * MS))
+        yield from states
+        run.source.update()
+        yield from rows(run.source.recording)
+        yield said(run.offered("t"))
+
+
+def fleet(_draw: Random) -> Iterator[str]:
+    """Ask robots of one world for all that a page may ask for."""
+    scenario = load_scenario("two-dodge").with_options(duration_s=0.25)
+    run, left, now = LiveFleet(scenario, speed=0.3), [*FLEET], 0
+    states: list[str] = []
+
+    def clock() -> int:
+        nonlocal now
+        now += LOOK_NS // 3
+        for panel, choice in (("program", "west: next line"), ("board", "east"), ("board", "gone")):
+            found = run.look(panel, choice)
+            states.append(f"{panel} {None if found is None else (found.at_ns, len(said(found)))}")
+        if left:
+            run.offer(left.pop(0))
+        return now
+
+    kept = run._show
+
+    def show(state: object) -> None:
+        states.append(said(state))
+        kept(state)  # type: ignore[arg-type]  # as it is
+
+    run._clock, run._show = clock, show  # type: ignore[method-assign,assignment]  # each of them
+    run.drive(Bench.together(scenario, slice_ns=10 * MS))
+    yield from states
+    run.source.update()
+    yield from rows(run.source.recording)
+
+
+def fleet_hands(draw: Random) -> Iterator[str]:
+    """Drive robots of one world by hand, heard of in time and too late."""
+    scenario = load_scenario("two-dodge").with_options(duration_s=0.6)
+    benches = Bench.together(scenario, slice_ns=10 * MS)
+    made, clock = FleetHands(benches, 500 * MS), 0
+    for _ in range(30):
+        clock += draw.choice((10, 100, 600)) * MS
+        robot = draw.choice(("", "west", "east", "none"))
+        words = draw.choice(("drive 0.2 10", "let go wheels", "press stop-button", "nothing", "carry robot to 0 0"))
+        command = RunCommand(
+            do=draw.choice(("drive", "drive", "stop")), robot=robot, forward_mps=draw.choice((0.0, 0.3))
+        )
+        told = [tried(made.do, robot, words) if draw.random() < 0.4 else "", tried(made.ask, command, clock),
+                tried(made.drive_on, clock)]  # fmt: skip
+        yield said([robot, words, command.do, told, [one.now for one in benches.values()]])
+        yield said([(one.robot, one.at, one.words) for one in made.done[-3:]])
+
+
+def looks(_draw: Random) -> Iterator[str]:
+    """Look at panels as often as may be, and at more than may be."""
+    counts: dict[str, int] = {}
+
+    def look(choice: str) -> list[PageSection]:
+        counts[choice] = counts.get(choice, 0) + 1
+        return [PageSection(title="t", blocks=[PageText(text=f"{choice} {counts[choice] // 2}")])]
+
+    panel = ViewPanel("a", "A", ("x",), look)
+    made = LookedPanels([panel])
+    for at in (0, 1, LOOK_NS - 1, LOOK_NS, LOOK_NS + 1, 2 * LOOK_NS, 3 * LOOK_NS):
+        told = [made.asked("a", "x"), made.asked("b", "x"), made.is_due(at)]
+        made.look(at, at // 2)
+        yield said([at, told, counts])
+    for number in range(MOST_LOOKS + 2):
+        made.asked("a", str(number))
+    made.look(9 * LOOK_NS, 5)
+    yield said([sorted(counts), [made.asked("a", str(n)) is None for n in range(MOST_LOOKS + 2)], len(made.panels)])
+    made.replace([])
+    with contextlib.suppress(KeyError):
+        made.look(99 * LOOK_NS, 5)
+    yield said([made.asked("a", "1"), made.panels])
+
+
+TRACES = {
+    "panels": panels, "hands": hands, "live": live, "fleet": fleet, "fleet_hands": fleet_hands, "looks": looks,
+}  # fmt: skip
+test_what_pages_are_shown_is_what_was_approved = judge_of(__file__, TRACES)

@@ -1,0 +1,326 @@
+"""Short runs of all kinds, whole: every line of their traces, what a program expects of them, and what they leave."""
+
+import json
+import os
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from random import Random
+from tempfile import TemporaryDirectory
+
+from adapter_sim.masters import Master
+from adapter_sim.pinout import load_pinout
+from p2os.robots.parameters import load_parameters
+from robot_bench import adapter, run
+from robot_bench.bench.bench import Bench, run_of
+from robot_bench.bench.board import cut_wires, pins_of
+from robot_bench.bench.expectations import Expectations
+from robot_bench.bench.far_end import FarEnd
+from robot_bench.bench.hand_driven_body import HandDrivenBody
+from robot_bench.bench.interventions import Interventions
+from robot_bench.bench.robot_run import RobotRun
+from robot_bench.bench.waiting import EventWait, mark_of
+from robot_bench.cli.shown.fleet_hands import FleetHands
+from robot_bench.recording.recorder import Recorder
+from robot_bench.recording.summary import outcome_of
+from robot_bench.report.make import Files
+from robot_bench.running.loop import RunLoop
+from robot_bench.scenario.loading import load_scenario
+from robot_bench.scenario.scenario import Scenario
+from simbase.errors import P2osError
+from simbase.timing import NS_PER_MS
+from tests.robot_bench.firmware.hurried import hurried
+from tests.tools.suite.approved import judge_of, said, tried
+
+#: What it is walked through with; imported, so that it stands near these.
+PARTS = (Recorder, RunLoop, EventWait, Expectations, FarEnd, HandDrivenBody, Interventions, RobotRun)
+SLICE_NS = 10 * NS_PER_MS
+HEAD = """
+firmware = "{firmware}"
+world = "room"
+body = "kinematic"
+mode = "{mode}"
+seed = 3
+duration_s = {duration}
+[start]
+x_m = 0.5
+y_m = 0.2
+heading_deg = 10.0
+"""
+THINGS = """
+[[obstacle]]
+at_s = 0.0
+op = "place"
+name = "post"
+shape = "cylinder"
+radius_m = 0.1
+height_m = 0.5
+x_m = 0.9
+y_m = 0.25
+[[obstacle]]
+at_s = 0.31
+op = "move"
+name = "post"
+x_m = 0.86
+y_m = 0.25
+[[obstacle]]
+at_s = 0.62
+op = "remove"
+name = "crate"
+[[hand]]
+at_s = 0.2
+do = "drive"
+forward_mps = 0.4
+turn_dps = 10.0
+[[hand]]
+at_s = 0.5
+do = "let_go"
+what = "wheels"
+[[hand]]
+at_s = 0.55
+do = "type"
+text = "go"
+[[hand]]
+at_s = 0.56
+do = "set_pin"
+pin = "PA0"
+level = "high"
+[[hand]]
+at_s = 0.57
+do = "set_volts"
+pin = "PA1"
+volts = 1.25
+[[hand]]
+at_s = 0.58
+do = "set_pin"
+pin = "encoder1_s1"
+level = "high"
+[[hand]]
+at_s = 0.6
+do = "let_go"
+what = "encoder1_s1"
+[[hand]]
+at_s = 0.7
+do = "carry"
+x_m = -0.5
+y_m = -0.4
+heading_deg = 45.0
+[[goal]]
+kind = "no_collision"
+[[goal]]
+kind = "min_distance"
+distance_m = 0.05
+[[goal]]
+kind = "usart_contains"
+text = "CRUISE"
+"""
+FAULTS = """
+[[fault]]
+at_s = 0.35
+fault = "sonar-stuck 3 0.2"
+for_s = 0.1
+[[fault]]
+at_s = 0.8
+fault = "link-down"
+for_s = 0.05
+"""
+WHEN = """
+[[when]]
+event = "contact"
+after_s = 0.1
+do = "end"
+"""
+
+
+def scenarios(folder: Path) -> Iterator[tuple[str, Scenario]]:
+    texts = {
+        "adapter": HEAD.format(firmware=hurried("dodge", 5), mode="adapter", duration=1.0) + THINGS + FAULTS,
+        "direct": HEAD.format(firmware=hurried("dodge", 1), mode="direct", duration=1.0) + THINGS,
+        "ended": HEAD.format(firmware=hurried("dodge", 1), mode="direct", duration=2.0) + THINGS + WHEN,
+        "motors": HEAD.format(firmware=hurried("motors", 1), mode="direct", duration=0.6),
+    }
+    for name, text in texts.items():
+        file = folder / f"{name}.toml"
+        file.write_text(text, encoding="utf-8")
+        yield name, load_scenario(str(file))
+    yield "rover", replace(load_scenario("rover"), goals=()).with_options(duration_s=0.4)
+    core = load_scenario(str(folder / "adapter.toml"))
+    yield "firmware", replace(core.with_options(adapter_core="firmware", duration_s=0.7), usart_baud=9600)
+
+
+def shown_lines(bench: Bench) -> Iterator[str]:
+    yield from (line.rstrip() for line in bench.trace.lines() if '"k":"meta"' not in line)
+
+
+def runs(_draw: Random) -> Iterator[str]:
+    """Run each scenario to its end and judge it."""
+    with TemporaryDirectory(prefix="p2os-test-") as name:
+        for what, scenario in scenarios(Path(name)):
+            bench = Bench(scenario, slice_ns=SLICE_NS)
+            bench.run_until(bench.end)
+            yield f"{what} {bench.end} {bench.now} {run_of(bench).note}"
+            yield said(bench.judge()).replace(name, "HERE")
+            yield from shown_lines(bench)
+            yield said([bench.pose, bench.text, bench.last_events(), bench.parts.body.state])
+            recorder = run_of(bench).recorder
+            yield said([recorder.min_clearance_m, recorder.distance_m, recorder.last_line, recorder.unfinished_text])
+            record = bench.record()
+            yield said(
+                [len(record.poses), len(record.contacts), record.usart_lines(), len(record.pins), record.last_ns]
+            )
+            yield said(outcome_of(record)).replace(name, "HERE")[:2000]
+            yield said([pins_of(scenario), sorted(cut_wires(scenario, load_pinout()))])
+
+
+def together(_draw: Random) -> Iterator[str]:
+    """Run two robots in one world, set them back, and let another pair go on from there."""
+    scenario = load_scenario("two-dodge").with_options(duration_s=0.5)
+    scenario = replace(scenario, robots=tuple(
+        replace(robot, scenario=robot.scenario and replace(robot.scenario, firmware=hurried("dodge", 1)))
+        for robot in scenario.robots
+    ))  # fmt: skip
+    benches = Bench.together(scenario, slice_ns=SLICE_NS)
+    first, second = benches.values()
+    first.run_until("0.1 s")
+    FleetHands(benches, first.end).do("west", "drive 0.4 60")
+    FleetHands(benches, first.end).do("east", "drive -0.3 20")
+    first.run_until("0.2 s")
+    first.checkpoint()
+    other = first.fork()
+    first.run_until(first.end)
+    for bench in benches.values():
+        yield said([bench.scenario.name, bench.now, bench.end, bench.pose, bench.level("motor1_comm1")])
+    first.rewind("0.3 s")
+    yield said([first.now, second.now, second.pose, run_of(second).recorder.distance_m])
+    first.run_until(first.end)
+    other.run_until(other.end)
+    for one in (*benches.values(), *other.robots.values()):
+        yield said([one.trace.length, *one.last_events(3)])
+    yield said(first.judge())
+    for bench in benches.values():
+        yield from shown_lines(bench)
+
+
+#: What is asked of a bench, one after the other: the method, its arguments.
+ASKED: Sequence[tuple[str, tuple[object, ...], dict[str, object]]] = (
+    ("expect", ("pin p2dx_con high",), {"within": "0.5 s"}),
+    ("expect_text", ("CRUISE",), {}),
+    ("expect_text", (re.compile("VEER|TURN"), "1 s"), {}),
+    ("expect", ("contact", "0.1 s"), {}),
+    ("expect", ("contact", 300), {}),
+    ("expect", ("contact", 1000), {}),
+    ("expect_no", ("contact", "0.05 s"), {}),
+    ("rewind", ("0.25 s",), {}),
+    *(("expect_pose", (), {**place, "within": "0 s"}) for place in (
+        {"x_m": 0.5696}, {"x_m": 0.5698}, {"y_m": 0.1536, "x_m": 0.52}, {"y_m": 0.1534}, {"heading_deg": 15.4},
+        {"heading_deg": 15.6}, {"heading_deg": 370.5}, {"heading_deg": -340.0, "tolerance_deg": 20.0},
+        {"x_m": 0.3, "y_m": 0.2, "tolerance_m": 0.2}, {"x_m": 0.33, "y_m": 0.2, "tolerance_m": 0.2}, {},
+    )),
+    ("expect_pose", (), {"x_m": 0.57, "tolerance_m": 0.001, "within": "90 ms"}),
+    ("expect_pose", (), {"x_m": 9.0, "y_m": -9.0, "heading_deg": 1.0, "within": "60 ms"}),
+    ("expect", ("contact",), {"within": "0.2 s"}),
+    ("expect_no", ("contact", "0.02 s"), {}),
+    ("rewind", ("0.3 s",), {}),
+    ("rewind", ("9 s",), {}),
+    ("expect_no", ("contact", "0.2 s"), {}),
+    ("expect", ("robot moves",), {}),
+    ("expect_no", ("pin encoder1_s1 changes", "0.1 s"), {}),
+    ("expect_pin", ("motor1_comm1", "high"), {"within": "0.02 s"}),
+    ("expect_pin", ("motor1_comm1", "low"), {"within": "0.02 s"}),
+    ("expect_pin", ("motor1_comm1", "half"), {}),
+    ("expect_pin", ("gone", "high"), {}),
+    ("expect", ("spi1 sends 00",), {}),
+    ("expect", ("nonsense",), {}),
+    ("run_until", ("0.6 s",), {}),
+    ("run_until", ("contact",), {"within": "0.1 s"}),
+    ("checkpoint", (), {}),
+    ("expect", ("pin motor1_comm2 changes", "0.1 s"), {}),
+    ("expect", ("pin motor1_comm2 changes", "0.1 s"), {}),
+    ("run_until", (lambda bench: bench.now > 800_000_000,), {"within": "0.3 s"}),
+    ("rewind", ("0.75 s",), {}),
+    ("expect", ("contact",), {"within": "5 s"}),
+    ("expect", ("contact",), {}),
+    ("run_until", ("99 s",), {}),
+    ("finish", (), {}),
+    ("run_until", ("100 s",), {}),
+    ("level", ("PB7",), {}),
+    ("level", ("PB99",), {}),
+)  # fmt: skip
+
+
+def expectations(_draw: Random) -> Iterator[str]:
+    """Ask a bench for what happens, what does not, and what cannot be."""
+    with TemporaryDirectory(prefix="p2os-test-") as name:
+        for what, scenario in [*scenarios(Path(name))][:2]:
+            bench = Bench(scenario, slice_ns=SLICE_NS)
+            yield said([what, repr(bench)])
+            for method, arguments, named in ASKED:
+                told = tried(getattr(bench, method), *arguments, **named)
+                shown = [one for one in arguments if isinstance(one, str | int)]
+                yield f"{method} {shown} {named}: {told} at {bench.now}, {run_of(bench).waits.since(bench.now)}"
+            yield said([bench.trace.length, mark_of(bench.events, bench.trace, run_of(bench).harness)])
+            yield tried(run_of(bench).refuse_the_ended)
+
+
+def folders(_draw: Random) -> Iterator[str]:
+    """Run into folders: what is told, what is left, what is refused."""
+    before = Path.cwd()
+    with TemporaryDirectory(prefix="p2os-test-") as name:
+        os.chdir(name)
+        try:
+            found = dict(scenarios(Path(name)))
+            for what in ("direct", "ended", "motors"):
+                told: list[object] = []
+
+                def note(progress: run.RunProgress, told: list[object] = told) -> None:
+                    told.append([progress.now // SLICE_NS, progress.duration_ns, progress.doing()])
+
+                place = Path(what)
+                done = run.run_scenario(
+                    found[what], place, on_progress=note, coverage=what == "motors", profile=what == "motors",
+                    fail_under=90.0, explained=what == "ended",
+                    files=Files.SUMMARY if what == "direct" else Files.REPORT,
+                )  # fmt: skip
+                kept = {key: value for key, value in done.outcome.items() if key not in {
+                    "real_time_factor", "wall_s", "p2os", "trace_sha256", "version", "firmware_sha256",
+                    "report"}}  # fmt: skip
+                yield said([what, done.passed, done.was_interrupted, done.report.name, told[-1:]])
+                yield json.dumps(kept, sort_keys=True, default=str).replace(name, "HERE")
+                yield said(sorted(path.name for path in place.iterdir()))
+                for text in ("pins.vcd", "usart.txt", "coverage.txt"):
+                    if (place / text).exists():
+                        yield from (place / text).read_text(encoding="utf-8").splitlines()[:60]
+            try:
+                run.run_scenario(found["motors"], Path("motors"))
+            except P2osError as error:
+                yield f"{error} ({error.hint})"
+        finally:
+            os.chdir(before)
+
+
+def numbers(_draw: Random) -> Iterator[str]:
+    """Give the adapter's firmware its numbers, for each robot; and round what is told of things."""
+    with TemporaryDirectory(prefix="p2os-test-") as name:
+        scenario = dict(scenarios(Path(name)))["firmware"]
+    for robot in ("p2dx", "p3at", "amigo"):
+        parameters = load_parameters(robot)
+        yield said([robot, adapter.robot_numbers(parameters), adapter.setting_numbers(scenario.adapter, parameters)])
+    yield said([adapter.wire_numbers(load_pinout()), adapter.is_available()])
+    bench = Bench(scenario)
+    made = bench.parts.adapter
+    assert isinstance(made, adapter.FirmwareAdapter)
+    for at in ("0 s", "0.1 s", "0.3 s", "0.5 s"):
+        bench.run_until(at)
+        yield said([made.state, made.master, made.baud, made.status, made.next_deadline(), sorted(made.wakes_on)])
+        yield said(made.numbers)
+    made.restore(made.snapshot())
+    yield tried(made.restore, 3)
+    made.shutdown("enough", bench.now)
+    yield said([made.state, made.take_output(), made.first_sight(5) - 5])
+    made.set_master(list(Master)[-1], bench.now)
+    yield said([made.master, made.numbers["master"]])
+
+
+TRACES = {"runs": runs, "together": together, "expectations": expectations, "folders": folders, "numbers": numbers}
+test_what_short_runs_are_is_what_was_approved = judge_of(__file__, TRACES)
