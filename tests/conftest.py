@@ -2,6 +2,7 @@
 
 import gc
 import os
+import random
 import sys
 from collections.abc import Iterable
 from copy import copy
@@ -90,6 +91,11 @@ def pytest_configure(config: pytest.Config) -> None:
     config.pluginmanager.register(TurnedFolders())
     # Here, since pytest rewrites its modules: after it is known where they are kept.
     from hypothesis import HealthCheck, Phase, settings
+    from hypothesis.internal import entropy
+
+    # Taken for NumPy's generator, which Hypothesis would seed and put back with each example, a quarter of the time of
+    # a short one: ruff keeps everybody from drawing of it (NPY002).
+    entropy.NP_RANDOM = random.Random()
 
     settings.register_profile("drawn", deadline=None, suppress_health_check=[HealthCheck.too_slow])
     settings.register_profile("repeated", settings.get_profile("drawn"), derandomize=True, database=None)

@@ -27,6 +27,7 @@ from tools.generators import browser_chip
 
 FIRMWARE = Path(__file__).resolve().parents[3] / "robot_bench" / "firmware"
 TOOLS = Path(__file__).resolve().parents[3] / "tools" / "page"
+SCRIPTS = TOOLS / "test" / "browser"
 #: The shipped programs that the page accepts: it names nothing of them as missing.
 ACCEPTED = ("motors", "encoders", "dodge", "dodge_duty", "sensors", "codes", "analog", "rover", "board_test")
 RUN_NS = 600_000_000
@@ -215,7 +216,7 @@ def seen(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     programs.append({"name": "strange", "file": str(strange), "ns": 10 * MS, "inputs": []})
     programs.append({"name": "usb_echo", "file": str(FIRMWARE / "usb_echo.elf"), "ns": 10 * MS, "inputs": []})
     asked.write_text(json.dumps({"programs": programs}), encoding="utf-8")
-    done = subprocess.run([node, str(TOOLS / "test" / "chip.mjs"), chromium, document.as_uri(), str(asked)],
+    done = subprocess.run([node, str(SCRIPTS / "chip.mjs"), chromium, document.as_uri(), str(asked)],
                           capture_output=True, text=True, timeout=170, check=False)  # fmt: skip
     assert done.returncode == 0, done.stderr[-3000:]
     found: dict[str, Any] = json.loads(done.stdout)

@@ -35,6 +35,7 @@ from tools.generators.page_frames import TARGET, text
 
 CAPTURE = Path(__file__).resolve().parents[2] / "golden" / "captures" / "aria_p2de.jsonl"
 TOOLS = Path(__file__).resolve().parents[3] / "tools" / "page"
+SCRIPTS = TOOLS / "test" / "browser"
 HOSTILE = (
     "<img src=x onerror=\"window.ran=1;alert(1)\"><script>window.ran=1</script><b onmouseover='window.ran=1'>x</b>"
 )
@@ -110,7 +111,7 @@ def seen(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     node, chromium = tools()
     page = tmp_path_factory.mktemp("page") / "report.html"
     page.write_text(page_of(recording()), encoding="utf-8")
-    done = subprocess.run([node, str(TOOLS / "test" / "browser.mjs"), chromium, page.as_uri()],
+    done = subprocess.run([node, str(SCRIPTS / "browser.mjs"), chromium, page.as_uri()],
                           capture_output=True, text=True, timeout=170, check=False)  # fmt: skip
     assert done.returncode == 0, done.stderr[-3000:]
     found: dict[str, Any] = json.loads(done.stdout)
@@ -128,7 +129,7 @@ def test_a_served_page_takes_its_token_out_of_the_address_and_says_when_nobody_a
     server = [sys.executable, "-m", "p2os", "view", str(CAPTURE), "--no-browser"]
     with (
         subprocess.Popen(server, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as serving,
-        subprocess.Popen([node, str(TOOLS / "test" / "served.mjs"), chromium, _address(serving)], stdin=subprocess.PIPE,
+        subprocess.Popen([node, str(SCRIPTS / "served.mjs"), chromium, _address(serving)], stdin=subprocess.PIPE,
                          stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as browser,
     ):  # fmt: skip
         assert browser.stdout is not None

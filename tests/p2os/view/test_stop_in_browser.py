@@ -16,7 +16,7 @@ import pytest
 pytest.importorskip("uvicorn", reason="the extra view is not installed")
 
 from tests.p2os.cli.driven import COMMAND, TIMEOUT_S, Driver, RecordingRobot
-from tests.p2os.view.test_page_in_browser import TOOLS, tools
+from tests.p2os.view.test_page_in_browser import SCRIPTS, tools
 
 
 def heard(driver: Driver, pattern: str) -> re.Match[str]:
@@ -37,7 +37,7 @@ def test_stop_is_in_sight_and_stops_by_a_click_and_by_escape() -> None:
         with contextlib.closing(Driver(words, on_terminal=True)) as driver:
             link, watch = heard(driver, r"(?s)page: (\S+)\s.*to look on: (\S+)\s.*stand").groups()
             done = subprocess.run(
-                [node, str(TOOLS / "test" / "stop.mjs"), chromium, link, watch, *os.environ.get("SHOTS", "").split()],
+                [node, str(SCRIPTS / "stop.mjs"), chromium, link, watch, *os.environ.get("SHOTS", "").split()],
                 capture_output=True, text=True, timeout=120, check=False,
             )  # fmt: skip
             driver.press("q")

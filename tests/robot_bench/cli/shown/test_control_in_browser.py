@@ -5,7 +5,6 @@ Needs what `tests/p2os/view/test_page_in_browser.py` needs.
 
 import json
 import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -14,16 +13,13 @@ import pytest
 pytest.importorskip("uvicorn", reason="the extra view is not installed")
 
 from robot_bench.recording.run_record import read_run
-from tests.p2os.view.test_page_in_browser import TOOLS, tools
+from tests.p2os.view.test_page_in_browser import SCRIPTS, tools
+from tests.tools.forked_python import forked_p2os
 
 S, MS = 1_000_000_000, 1_000_000
 RUN = ["run", "motors", "--body", "kinematic", "--duration", "2s", "--out"]
 #: chosen: slow enough that a browser is there before it is over.
 SLOWLY = ["--realtime", "0.05", "--view", "--no-browser"]
-
-
-def p2os(*words: str) -> list[str]:
-    return [sys.executable, "-m", "p2os", *words]
 
 
 @pytest.fixture(scope="module")
@@ -35,11 +31,11 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def found(folders: Path) -> dict[str, Any]:
     """Return what came of the run that was controlled in the browser; all tests here look at it."""
     node, chromium = tools()
-    with subprocess.Popen(p2os(*RUN, str(folders / "with"), *SLOWLY), stderr=subprocess.PIPE,
+    with subprocess.Popen(forked_p2os(*RUN, str(folders / "with"), *SLOWLY), stderr=subprocess.PIPE,
                           stdout=subprocess.PIPE, text=True) as running:  # fmt: skip
         assert running.stderr is not None
         links = [running.stderr.readline().partition(": ")[2].strip() for _ in range(2)]
-        done = subprocess.run([node, str(TOOLS / "test" / "control.mjs"), chromium, *links],
+        done = subprocess.run([node, str(SCRIPTS / "control.mjs"), chromium, *links],
                               capture_output=True, text=True, timeout=170, check=False)  # fmt: skip
         if done.returncode:
             running.terminate()
@@ -52,7 +48,7 @@ def found(folders: Path) -> dict[str, Any]:
 
 @pytest.mark.slow
 def test_the_trace_is_that_of_a_run_without_page(found: dict[str, Any], folders: Path) -> None:
-    subprocess.run(p2os(*RUN, str(folders / "without")), capture_output=True, timeout=100, check=True)
+    subprocess.run(forked_p2os(*RUN, str(folders / "without")), capture_output=True, timeout=100, check=True)
     with_page, without = (read_run(folders / name).end["trace_sha256"] for name in ("with", "without"))
     assert with_page == without
     assert found["errors"] == []

@@ -11,8 +11,8 @@ import pytest
 
 pytest.importorskip("uvicorn", reason="the extra view is not installed")
 
-from tests.p2os.view.test_page_in_browser import TOOLS, tools
-from tests.robot_bench.cli.shown.test_control_in_browser import p2os
+from tests.p2os.view.test_page_in_browser import SCRIPTS, tools
+from tests.tools.forked_python import forked_p2os
 
 RUN = ["run", "two-dodge", "--duration", "2s", "--realtime", "0.1", "--view"]
 
@@ -20,11 +20,11 @@ RUN = ["run", "two-dodge", "--duration", "2s", "--realtime", "0.1", "--view"]
 @pytest.mark.slow
 def test_all_robots_are_seen_live_and_one_is_chosen(tmp_path: Path) -> None:
     node, chromium = tools()
-    with subprocess.Popen(p2os(*RUN, "--no-browser", "--out", str(tmp_path / "run")), stderr=subprocess.PIPE,
+    with subprocess.Popen(forked_p2os(*RUN, "--no-browser", "--out", str(tmp_path / "run")), stderr=subprocess.PIPE,
                           stdout=subprocess.PIPE, text=True) as running:  # fmt: skip
         assert running.stderr is not None
         link = running.stderr.readline().partition(": ")[2].strip()
-        done = subprocess.run([node, str(TOOLS / "test" / "fleet.mjs"), chromium, link],
+        done = subprocess.run([node, str(SCRIPTS / "fleet.mjs"), chromium, link],
                               capture_output=True, text=True, timeout=120, check=False)  # fmt: skip
         if done.returncode:
             running.terminate()

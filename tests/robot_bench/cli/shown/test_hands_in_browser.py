@@ -6,7 +6,6 @@ Needs what `tests/p2os/view/test_page_in_browser.py` needs.
 import json
 import signal
 import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,8 @@ import pytest
 
 pytest.importorskip("uvicorn", reason="the extra view is not installed")
 
-from tests.p2os.view.test_page_in_browser import TOOLS, tools
+from tests.p2os.view.test_page_in_browser import SCRIPTS, tools
+from tests.tools.forked_python import PYTEST, forked_p2os, forked_python
 
 #: Dodge drives straight ahead from 3.5 s on, and is at x = 0.7 m by 7 s.
 #: Long enough before it comes to what is dragged into its way that a browser is there in time.
@@ -46,11 +46,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def found(folder: Path) -> dict[str, Any]:
     """Return what came of the run that hands were put to; all tests here look at it."""
     node, chromium = tools()
-    with subprocess.Popen([sys.executable, "-m", "p2os", "view", "way.toml", "--no-browser"], cwd=folder, text=True,
+    with subprocess.Popen(forked_p2os("view", "way.toml", "--no-browser"), cwd=folder, text=True,
                           stderr=subprocess.PIPE, stdout=subprocess.PIPE) as running:  # fmt: skip
         assert running.stderr is not None
         link = running.stderr.readline().partition(": ")[2].strip()
-        done = subprocess.run([node, str(TOOLS / "test" / "hands.mjs"), chromium, link],
+        done = subprocess.run([node, str(SCRIPTS / "hands.mjs"), chromium, link],
                               capture_output=True, text=True, timeout=200, check=False)  # fmt: skip
         running.send_signal(signal.SIGINT)
         running.communicate(timeout=60)
@@ -60,9 +60,11 @@ def found(folder: Path) -> dict[str, Any]:
 
 
 def pytest_of(saved: str, folder: Path) -> subprocess.CompletedProcess[str]:
-    words = saved.removeprefix("saved: ").split()
-    return subprocess.run([sys.executable, "-m", *words, "-q", "-p", "no:cacheprovider", "--bench-record", "none"],
-                          cwd=folder, capture_output=True, text=True, timeout=100, check=False)  # fmt: skip
+    program, *words = saved.removeprefix("saved: ").split()
+    assert program == "pytest"
+    words += ["-q", "-p", "no:cacheprovider", "--bench-record", "none"]
+    return subprocess.run([forked_python(), "-c", PYTEST, *words], cwd=folder,
+                          capture_output=True, text=True, timeout=100, check=False)  # fmt: skip
 
 
 @pytest.mark.slow
@@ -87,7 +89,7 @@ def test_a_future_without_it_is_saved_as_a_test_that_passes(found: dict[str, Any
 @pytest.mark.slow
 def test_the_run_folder_replays_what_hands_did(found: dict[str, Any], folder: Path) -> None:
     run = folder / "runs" / "way-001"
-    words = [sys.executable, "-m", "p2os", "run", str(run / "hands.toml"), "--out", "again", "--json"]
+    words = forked_p2os("run", str(run / "hands.toml"), "--out", "again", "--json")
     done = subprocess.run(words, cwd=folder, capture_output=True, text=True, timeout=100, check=False)
     live = json.loads((run / "summary.json").read_text())
     assert json.loads(done.stdout)["trace_sha256"] == live["trace_sha256"]

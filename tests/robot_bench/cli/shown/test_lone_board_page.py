@@ -3,7 +3,6 @@
 import json
 import signal
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -25,9 +24,10 @@ from robot_bench.cli.shown.offered_hands import hands_of
 from robot_bench.events.kinds import PinEdge, Pose, Text
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_MS, NS_PER_S
-from tests.p2os.view.test_page_in_browser import TOOLS, tools
+from tests.p2os.view.test_page_in_browser import SCRIPTS, tools
 from tests.robot_bench.running.test_run_control import Controlled, Listener
 from tests.tools.examples import EXAMPLES
+from tests.tools.forked_python import forked_p2os
 
 MOTORS = EXAMPLES / "motors.elf"
 SPAN = 40 * NS_PER_MS
@@ -151,11 +151,11 @@ def test_what_is_asked_for_comes_to_the_page(monkeypatch: pytest.MonkeyPatch) ->
 def test_the_page_of_a_board_in_a_browser() -> None:
     pytest.importorskip("uvicorn")
     node, chromium = tools()
-    words = [sys.executable, "-m", "p2os", "mcu", "run", str(MOTORS), "--view", "--no-browser"]
+    words = forked_p2os("mcu", "run", str(MOTORS), "--view", "--no-browser")
     with subprocess.Popen(words, stderr=subprocess.PIPE, text=True) as running:
         assert running.stderr is not None
         link = running.stderr.readline().partition(": ")[2].strip()
-        done = subprocess.run([node, str(TOOLS / "test" / "board.mjs"), chromium, link],
+        done = subprocess.run([node, str(SCRIPTS / "board.mjs"), chromium, link],
                               capture_output=True, text=True, timeout=170, check=False)  # fmt: skip
         running.send_signal(signal.SIGINT)
         running.communicate(timeout=60)

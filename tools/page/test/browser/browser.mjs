@@ -1,11 +1,8 @@
 // Opens a page in Chromium as a person would, and says as JSON what came of it. Usage: node browser.mjs CHROMIUM FILE-OR-URL
-import { chromium } from "playwright-core";
-import { readFileSync } from "node:fs";
-import { createRequire } from "node:module";
+import { axe, COLOURS, complaints, launched, SCENES } from "./opened.mjs";
 
 const [executablePath, url] = process.argv.slice(2);
-const axe = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
-const browser = await chromium.launch({ executablePath, args: ["--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run", "--disable-background-networking"] });
+const browser = await launched(executablePath, SCENES);
 const found = { errors: [], dialogs: [], requests: [], complaints: [] };
 
 async function open(fragment, options = {}) {
@@ -112,21 +109,23 @@ found.zoomed = await state(wires);
 await wires.context().close();
 
 // Accessibility, wide and narrow, light and dark; of a page that was looked at, only the view that another tab shows.
-async function complain(looked, where, part = "html") {
+const looked = await open("layout=student", { bypassCSP: true });
+await looked.evaluate(axe);
+async function complain(where, more) {
   await looked.waitForTimeout(150);
-  const violations = await looked.evaluate(async (within) => (await axe.run(within, { resultTypes: ["violations"] })).violations.map((one) => `${one.id}: ${one.nodes[0].html.slice(0, 160)}`), part);
-  found.complaints.push(...violations.map((one) => `${where}: ${one}`));
-  if (await looked.evaluate(() => document.documentElement.scrollWidth > innerWidth)) found.complaints.push(`${where}: wider than the screen`);
+  found.complaints.push(...await complaints(looked, where, more));
 }
-for (const [width, colorScheme, layout] of [[1400, "light", "student"], [1400, "dark", "firmware"], [420, "light", ""], [420, "dark", ""]]) {
-  const looked = await open(`layout=${layout}`, { viewport: { width, height: 900 }, colorScheme, bypassCSP: true });
-  await looked.evaluate(axe);
-  if (layout) await complain(looked, `${width} ${colorScheme} ${layout}`);
-  else for (const [number, tab] of (await looked.getByRole("tab").all()).entries()) {
+await complain("1400 light student");
+await looked.emulateMedia({ colorScheme: "dark" });
+await looked.getByRole("combobox", { name: "Layout" }).selectOption("firmware");
+await complain("1400 dark firmware");
+await looked.setViewportSize({ width: 420, height: 900 });
+for (const colorScheme of ["light", "dark"]) {
+  await looked.emulateMedia({ colorScheme });
+  for (const [number, tab] of (await looked.getByRole("tab").all()).entries()) {
     await tab.click();
-    await complain(looked, `${width} ${colorScheme} ${await tab.textContent()}`, number ? "#tab-panel" : "html");
+    await complain(`420 ${colorScheme} ${await tab.textContent()}`, { part: number ? "#tab-panel" : "html", rules: colorScheme === "dark" ? COLOURS : {} });
   }
-  await looked.context().close();
 }
 await browser.close();
 console.log(JSON.stringify(found));

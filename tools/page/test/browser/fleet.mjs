@@ -1,14 +1,11 @@
 // Looks at robots of one world while they run, in Chromium: all of them in the plan, one whose pins and program are shown; says as JSON what came of it.
 // Usage: node fleet.mjs CHROMIUM ADDRESS; with P2OS_SHOTS screenshots are put into that folder.
-import { chromium } from "playwright-core";
-import { readFileSync } from "node:fs";
-import { createRequire } from "node:module";
+import { axe, complaints, drawnSeldom, launched, SCENES } from "./opened.mjs";
 
 const [executablePath, url] = process.argv.slice(2);
-const axe = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
-const browser = await chromium.launch({ executablePath, args: ["--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run", "--disable-background-networking"] });
+const browser = await launched(executablePath, SCENES);
 const found = { errors: [], complaints: [] }, LONG = { timeout: 30_000 };
-const page = await (await browser.newContext({ viewport: { width: 1400, height: 900 }, bypassCSP: true })).newPage();
+const page = await (await drawnSeldom(browser, { bypassCSP: true })).newPage();
 page.setDefaultTimeout(30_000);
 page.on("console", (message) => { if (message.type() === "error") found.errors.push(message.text()); });
 page.on("pageerror", (error) => found.errors.push(error.message));
@@ -46,9 +43,7 @@ for (const [width, colorScheme, tab] of [[1400, "light", "Program"], [1400, "dar
   await page.emulateMedia({ colorScheme });
   await page.getByRole("tab", { name: tab, exact: true }).click();
   await page.waitForTimeout(400);
-  const violations = await page.evaluate(async () => (await axe.run(document, { resultTypes: ["violations"] })).violations.map((one) => `${one.id}: ${one.nodes[0].html.slice(0, 160)}`));
-  found.complaints.push(...violations.map((one) => `${width} ${colorScheme} ${tab}: ${one}`));
-  if (await page.evaluate(() => document.documentElement.scrollWidth > innerWidth)) found.complaints.push(`${width} ${tab}: wider than the screen`);
+  found.complaints.push(...await complaints(page, `${width} ${colorScheme} ${tab}`));
   if (process.env.P2OS_SHOTS) await page.screenshot({ path: `${process.env.P2OS_SHOTS}/fleet-${tab}-${width}-${colorScheme}.png` });
 }
 await page.setViewportSize({ width: 1400, height: 900 });

@@ -1,8 +1,8 @@
 // Opens a served page in Chromium, and says as JSON what came of it. Usage: node served.mjs CHROMIUM ADDRESS-WITH-TOKEN; a line on stdin: the server has ended.
-import { chromium } from "playwright-core";
+import { launched } from "./opened.mjs";
 
 const [executablePath, url] = process.argv.slice(2);
-const browser = await chromium.launch({ executablePath, args: ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking"] });
+const browser = await launched(executablePath);
 const found = { errors: [], requests: [], asked: [] };
 const page = await browser.newPage({ viewport: { width: 1400, height: 900 } });
 page.on("console", (message) => { if (message.type() === "error") found.errors.push(message.text()); });

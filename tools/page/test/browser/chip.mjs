@@ -1,13 +1,11 @@
 // Opens the page of `p2os mcu page` in Chromium as a person would, and says as JSON what came of it.
 // Usage: node chip.mjs CHROMIUM URL JSON [FOLDER], where the JSON has `programs`: rows of name, file, ns, and inputs
 // [ns, pin, level]. With a folder, screenshots are put there.
-import { chromium } from "playwright-core";
+import { axe, COLOURS, complaints, launched } from "./opened.mjs";
 import { readFileSync } from "node:fs";
-import { createRequire } from "node:module";
 
 const [executablePath, url, asked, folder] = process.argv.slice(2), { programs } = JSON.parse(readFileSync(asked, "utf8"));
-const axe = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
-const browser = await chromium.launch({ executablePath, args: ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking"] });
+const browser = await launched(executablePath);
 const found = { errors: [], requests: [], complaints: [], runs: {} };
 
 async function open(options = {}) {
@@ -69,16 +67,17 @@ await page.keyboard.press("Enter");
 found.typed = await page.getByRole("textbox", { name: "type to it" }).inputValue();
 
 // What axe says, and pictures: wide and narrow, light and dark.
+const seen = await open();
+await seen.setInputFiles("#file", programs.at(-1).file);
+await seen.waitForFunction(() => document.getElementById("speed").textContent.includes("MHz"), undefined, { timeout: 20000 });
+await seen.evaluate(axe);
 for (const [width, colorScheme] of [[1400, "light"], [1400, "dark"], [420, "light"], [420, "dark"]]) {
-  const seen = await open({ viewport: { width, height: 900 }, colorScheme });
-  await seen.setInputFiles("#file", programs.at(-1).file);
-  await seen.waitForFunction(() => document.getElementById("speed").textContent.includes("MHz"), undefined, { timeout: 20000 });
+  await seen.setViewportSize({ width, height: 900 });
+  await seen.emulateMedia({ colorScheme });
+  await seen.waitForTimeout(150);
   found[`wide ${width}`] = await seen.evaluate(() => document.documentElement.scrollWidth - innerWidth);
-  await seen.evaluate(axe);
-  const { violations } = await seen.evaluate(() => globalThis.axe.run());
-  for (const { id, nodes } of violations) found.complaints.push(`${width} ${colorScheme}: ${id} ${nodes[0]?.html.slice(0, 100)}`);
+  found.complaints.push(...await complaints(seen, `${width} ${colorScheme}`, { rules: colorScheme === "dark" ? COLOURS : {} }));
   if (folder) await seen.screenshot({ path: `${folder}/chip-${width}-${colorScheme}.png`, fullPage: true });
-  await seen.context().close();
 }
 await browser.close();
 console.log(JSON.stringify(found));

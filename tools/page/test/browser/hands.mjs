@@ -1,15 +1,12 @@
 // Puts hands to a run from its page in Chromium, and says as JSON what came of it. Usage: node hands.mjs CHROMIUM ADDRESS; a line on stdin: another page may drive.
-import { chromium } from "playwright-core";
-import { readFileSync } from "node:fs";
-import { createRequire } from "node:module";
+import { axe, COLOURS, complaints, drawnSeldom, launched } from "./opened.mjs";
 
 const [executablePath, url] = process.argv.slice(2);
-const axe = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
-const browser = await chromium.launch({ executablePath, args: ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking"] });
+const browser = await launched(executablePath);
 const found = { errors: [], complaints: [] }, LONG = { timeout: 40_000 };
 
 async function open() {
-  const page = await (await browser.newContext({ viewport: { width: 1400, height: 900 }, bypassCSP: true })).newPage();
+  const page = await (await drawnSeldom(browser, { bypassCSP: true })).newPage();
   page.setDefaultTimeout(40_000);
   await page.addInitScript(() => { navigator.getGamepads = () => [window.pad ?? null]; });
   page.on("console", (message) => { if (message.type() === "error") found.errors.push(message.text()); });
@@ -115,9 +112,7 @@ for (const [width, colorScheme] of [[1400, "light"], [1400, "dark"], [420, "ligh
   await page.emulateMedia({ colorScheme });
   await page.getByRole("tab", { name: "Hands" }).click();
   await page.waitForTimeout(250);
-  const violations = await page.evaluate(async () => (await axe.run(document, { resultTypes: ["violations"] })).violations.map((one) => `${one.id}: ${one.nodes[0].html.slice(0, 160)}`));
-  found.complaints.push(...violations.map((one) => `${width} ${colorScheme}: ${one}`));
-  if (await page.evaluate(() => document.documentElement.scrollWidth > innerWidth)) found.complaints.push(`${width}: wider than the screen`);
+  found.complaints.push(...await complaints(page, `${width} ${colorScheme}`, { rules: colorScheme === "dark" ? COLOURS : {} }));
   if (process.env.P2OS_SHOTS) await page.screenshot({ path: `${process.env.P2OS_SHOTS}/hands-${width}-${colorScheme}.png` });
 }
 console.log(JSON.stringify(found));

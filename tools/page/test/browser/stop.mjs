@@ -1,12 +1,12 @@
 // Looks at the page of a robot that a terminal drives, and presses STOP and Escape there; says as JSON what came of it.
 // Usage: node stop.mjs CHROMIUM ADDRESS LOOKING-ON [FOLDER]; with a folder, screenshots are put there.
-import { chromium } from "playwright-core";
+import { drawnSeldom, launched } from "./opened.mjs";
 
 const [executablePath, url, watch, folder] = process.argv.slice(2), found = { errors: [], names: {} };
-const browser = await chromium.launch({ executablePath, args: ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking"] });
+const browser = await launched(executablePath);
 
 async function open(link, width) {
-  const page = await (await browser.newContext({ viewport: { width, height: 900 } })).newPage();
+  const page = await (await drawnSeldom(browser, { viewport: { width, height: 900 } })).newPage();
   page.setDefaultTimeout(40_000);
   page.on("console", (message) => { if (message.type() === "error") found.errors.push(message.text()); });
   page.on("pageerror", (error) => found.errors.push(error.message));

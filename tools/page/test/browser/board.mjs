@@ -1,9 +1,9 @@
 // Controls a board by itself from its page in Chromium, and says as JSON what came of it. Usage: node board.mjs CHROMIUM ADDRESS
-import { chromium } from "playwright-core";
+import { drawnSeldom, launched } from "./opened.mjs";
 
 const [executablePath, url] = process.argv.slice(2), found = { errors: [] };
-const browser = await chromium.launch({ executablePath, args: ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking"] });
-const page = await (await browser.newContext({ viewport: { width: 1400, height: 900 } })).newPage();
+const browser = await launched(executablePath);
+const page = await (await drawnSeldom(browser)).newPage();
 page.setDefaultTimeout(40_000);
 page.on("console", (message) => { if (message.type() === "error") found.errors.push(message.text()); });
 page.on("pageerror", (error) => found.errors.push(error.message));
