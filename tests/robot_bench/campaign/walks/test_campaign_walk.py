@@ -213,17 +213,17 @@ def campaigns(_draw: Random) -> Iterator[str]:
                     place / "camp.toml", place / "kept", firmware=None, overrides={"budget": {"runs": runs}}
                 )
                 ticks = itertools.count(0, 60 * 10**9)
-                told: list[tuple[int, int]] = []
+                reported: list[tuple[int, int]] = []
 
-                def note(progress: CampaignProgress, told: list[tuple[int, int]] = told) -> None:
-                    told.append((progress.runs, progress.answered))
+                def note(progress: CampaignProgress, reported: list[tuple[int, int]] = reported) -> None:
+                    reported.append((progress.runs, progress.answered))
 
                 for last in (until, 10**6):
                     workers = Shuffled(number, last, made_up)
                     done = carry_out(
                         campaign, place / "kept", workers, clock=lambda ticks=ticks: next(ticks), on_run=note
                     )
-                    yield said([search, told[-1:], workers.count, sum(workers.anew), done.was_interrupted])
+                    yield said([search, reported[-1:], workers.count, sum(workers.anew), done.was_interrupted])
                     if not done.was_interrupted:
                         break
                     campaign = resume(place / "kept")

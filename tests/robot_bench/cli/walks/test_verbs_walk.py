@@ -310,7 +310,7 @@ def result_of(**changes: object) -> RunResult:
 
 def handed_on(_draw: Random) -> Iterator[str]:
     """Run runs whose work is only noted: which scenario, where to, how fast, with what beside."""
-    told: list[str] = []
+    reported: list[str] = []
 
     def noted(name: str) -> Any:
         def note(*arguments: object, **named: object) -> RunResult:
@@ -318,7 +318,7 @@ def handed_on(_draw: Random) -> Iterator[str]:
                 key: value if isinstance(value, int | float | str | bool | tuple | list | None) else type(value)
                 for key, value in named.items()
             }
-            told.append(
+            reported.append(
                 f"{name} {said([scenario_words(one) for one in arguments])} {said(plain)}".split(" object at ")[0]
             )
             return result_of()
@@ -327,7 +327,7 @@ def handed_on(_draw: Random) -> Iterator[str]:
 
     @contextlib.contextmanager
     def page(*_: object, **named: object) -> Iterator[object]:
-        told.append(f"page {said({key: value for key, value in named.items() if key != 'display'})}")
+        reported.append(f"page {said({key: value for key, value in named.items() if key != 'display'})}")
         yield None
 
     works = {
@@ -361,9 +361,9 @@ def handed_on(_draw: Random) -> Iterator[str]:
             "demo",
             "demo --duration 20s --out there --force --json",
         ):
-            told.clear()
+            reported.clear()
             ended = [*printed(p2os, line.split())]
-            yield f"$ {line}: {told} {ended}"
+            yield f"$ {line}: {reported} {ended}"
     dodge = load_scenario("dodge")
     for one in (dodge, replace(dodge, adapter=replace(dodge.adapter, max_velocity_mm_s=150, max_rotation_deg_s=20))):
         for speed in (None, 0.1234):
@@ -568,8 +568,8 @@ def projects(draw: Random) -> Iterator[str]:
             yield said(replace(found, folder=Path("P"))).partition(", ProjectLayout")[0]
             yield said([found.program, [*found.others], found.sources, found.build, found.name])
             for name, text in existing.files_beside(found, "kinematic").items():
-                told = [line for line in text.splitlines() if "made" in line or "kinematic" in line]
-                yield f"{name} {len(text)} {told}"
+                reported = [line for line in text.splitlines() if "made" in line or "kinematic" in line]
+                yield f"{name} {len(text)} {reported}"
         (folder / "CMakePresets.json").write_text(
             '{"configurePresets": [{"binaryDir": "${sourceDir}/out/${presetName}/", "name": "a"}, {"binaryDir": "/x"},'
             ' {"binaryDir": "../y"}, {"binaryDir": "$env{HOME}/z"}, {"binaryDir": "o/${presetName}"},'

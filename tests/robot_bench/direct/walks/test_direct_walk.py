@@ -171,11 +171,11 @@ def pioneers(draw: Random) -> Iterator[str]:
             now = max(now, robot.next_deadline() if step % 3 else now + draw.choice((1, MS, 30 * MS)))
             robot.advance_to(now)
             levels = " ".join("".join(str(int(net.level(now))) for net in one) for one in shown)
-            told = [(one.speed_um_per_s, one.asked, one.value(now), one.fastest_um_per_s(7), one.is_steady)
+            reported = [(one.speed_um_per_s, one.asked, one.value(now), one.fastest_um_per_s(7), one.is_steady)
                     for one in motors]  # fmt: skip
             margins = [one.margin_rad(body.state.left_angle_rad) for one in (robot._left_encoder, robot._right_encoder)]
             state = body.state
-            yield f"{now} {levels} {told} {said(margins)} {said([state.x_m, state.y_m, state.heading_rad])}"
+            yield f"{now} {levels} {reported} {said(margins)} {said([state.x_m, state.y_m, state.heading_rad])}"
             yield f"{robot.next_deadline()} {said(robot.next_setpoints())} {said(events)}"
             events.clear()
 

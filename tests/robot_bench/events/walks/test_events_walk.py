@@ -219,9 +219,9 @@ def replace_written(made: TraceWriter) -> Any:
 def stream(draw: Random) -> Iterator[str]:
     """Publish, subscribe and release at random: who hears of what, when."""
     for _ in range(6):
-        made, told, ends = EventStream(), list[str](), list[Any]()
+        made, reported, ends = EventStream(), list[str](), list[Any]()
         listeners = made.listeners()
-        made.record(lambda events, limit, told=told: told.append(f"recorded {len(events)} {limit}"))
+        made.record(lambda events, limit, reported=reported: reported.append(f"recorded {len(events)} {limit}"))
         now = 0
         for step in range(40):
             chance = draw.random()
@@ -229,14 +229,18 @@ def stream(draw: Random) -> Iterator[str]:
                 kinds = tuple(draw.sample((Pose, Text, PinEdge, Contact), draw.randrange(4)))
                 wires = draw.choice((None, ["DD1"], ["DD1", "DD2"]))
 
-                def hear(event: Event, step: int = step, told: list[str] = told, made: EventStream = made) -> None:
-                    told.append(f"{step} hears {type(event).__name__} {event.t}")
+                def hear(
+                    event: Event, step: int = step, reported: list[str] = reported, made: EventStream = made
+                ) -> None:
+                    reported.append(f"{step} hears {type(event).__name__} {event.t}")
                     if isinstance(event, Text) and event.data == b"echo":
                         made.publish(Text(t=event.t + 1, data=b"again"))
 
                 ends.append(made.subscribe(hear, *kinds, wires=wires))
             elif chance < 0.27:
-                ends.append(made.at_limit(lambda limit, step=step, told=told: told.append(f"{step} at {limit}")))
+                ends.append(
+                    made.at_limit(lambda limit, step=step, reported=reported: reported.append(f"{step} at {limit}"))
+                )
             elif chance < 0.35 and ends:
                 ends.pop(draw.randrange(len(ends)))()
             elif chance < 0.7:
@@ -245,26 +249,26 @@ def stream(draw: Random) -> Iterator[str]:
                     Text(t=at, data=draw.choice((b"echo", b"x"))), Levels(t=at, nets=("DD1", "DD3"), levels="10"),
                     Contact(t=at, what="x", x_m=0.0, y_m=0.0), Verdict(t=at, goal="g", met=True, says=""),
                 ))  # fmt: skip
-                told.append(f"{type(event).__name__} {at} {tried(made.publish, event)}")
+                reported.append(f"{type(event).__name__} {at} {tried(made.publish, event)}")
             else:
                 now += draw.randrange(6)
                 tracks = {"DD1": (0, Edges([(now - 1, 1), (now, 0)])), "DD2": (1, Edges([(now, 1)]))}
                 chosen = {wire: row for wire, row in tracks.items() if draw.random() < 0.5 and made.wants_edges(wire)}
                 made.release(now, chosen or None)
-                told.append(f"pending {said([one.t for one in made.pending()])} {made.released_until}")
+                reported.append(f"pending {said([one.t for one in made.pending()])} {made.released_until}")
             if step == 30 and draw.random() < 0.5:
                 made.drop_later(listeners)
-            yield " | ".join(told)
-            told.clear()
+            yield " | ".join(reported)
+            reported.clear()
 
 
 def transfers(draw: Random) -> Iterator[str]:  # noqa: C901 - three buses side by side
     """Put words, conditions and frames together, in slices of any length."""
     for _ in range(5):
-        told: list[str] = []
+        reported: list[str] = []
 
-        def tell(one: Event, told: list[str] = told) -> None:
-            told.append(said(one))
+        def tell(one: Event, reported: list[str] = reported) -> None:
+            reported.append(said(one))
 
         spi, i2c, can, now = SpiTransfers("spi1", tell), I2cTransfers("i2c1", tell), CanTransfers("can", tell), 0
         for _ in range(40):
@@ -291,16 +295,16 @@ def transfers(draw: Random) -> Iterator[str]:  # noqa: C901 - three buses side b
                     other = kind("x", lambda _: None)
                     other.restore(one.snapshot())
                     one.restore(other.snapshot())
-            yield " | ".join(told)
-            told.clear()
+            yield " | ".join(reported)
+            reported.clear()
         for one in (spi, i2c, can):
             one.release(now + 5, is_end=True)
-        yield " | ".join(told)
-    long = SpiTransfers("spi1", lambda one: told.append(f"{one.t} {len(one.from_master)}"))  # type: ignore[union-attr]
+        yield " | ".join(reported)
+    long = SpiTransfers("spi1", lambda one: reported.append(f"{one.t} {len(one.from_master)}"))  # type: ignore[union-attr]
     long.take([SpiWord(1000 * (n + 1), n & 0xFF, 0, 8, 1000) for n in range(4100)])
-    more = I2cTransfers("i2c1", lambda one: told.append(f"{one.t} {len(one.data)} {one.end}"))  # type: ignore[union-attr]
+    more = I2cTransfers("i2c1", lambda one: reported.append(f"{one.t} {len(one.data)} {one.end}"))  # type: ignore[union-attr]
     more.take([I2cSymbol(1, I2cStep.START, 0, False), *(I2cSymbol(n + 2, I2cStep.BYTE, 8, True) for n in range(4100))])
-    yield said(told)
+    yield said(reported)
 
 
 def views(draw: Random) -> Iterator[str]:

@@ -256,25 +256,25 @@ def expectations(_draw: Random) -> Iterator[str]:
             bench = Bench(scenario, slice_ns=SLICE_NS)
             yield said([what, repr(bench)])
             for method, arguments, named in ASKED:
-                told = tried(getattr(bench, method), *arguments, **named)
+                reported = tried(getattr(bench, method), *arguments, **named)
                 shown = [one for one in arguments if isinstance(one, str | int)]
-                yield f"{method} {shown} {named}: {told} at {bench.now}, {run_of(bench).waits.since(bench.now)}"
+                yield f"{method} {shown} {named}: {reported} at {bench.now}, {run_of(bench).waits.since(bench.now)}"
             yield said([bench.trace.length, mark_of(bench.events, bench.trace, run_of(bench).harness)])
             yield tried(run_of(bench).refuse_the_ended)
 
 
 def folders(_draw: Random) -> Iterator[str]:
-    """Run into folders: what is told, what is left, what is refused."""
+    """Run into folders: what is reported, what is left, what is refused."""
     before = Path.cwd()
     with TemporaryDirectory(prefix="p2os-test-") as name:
         os.chdir(name)
         try:
             found = dict(scenarios(Path(name)))
             for what in ("direct", "ended", "motors"):
-                told: list[object] = []
+                reported: list[object] = []
 
-                def note(progress: run.RunProgress, told: list[object] = told) -> None:
-                    told.append([progress.now // SLICE_NS, progress.duration_ns, progress.doing()])
+                def note(progress: run.RunProgress, reported: list[object] = reported) -> None:
+                    reported.append([progress.now // SLICE_NS, progress.duration_ns, progress.doing()])
 
                 place = Path(what)
                 done = run.run_scenario(
@@ -285,7 +285,7 @@ def folders(_draw: Random) -> Iterator[str]:
                 kept = {key: value for key, value in done.outcome.items() if key not in {
                     "real_time_factor", "wall_s", "p2os", "trace_sha256", "version", "firmware_sha256",
                     "report"}}  # fmt: skip
-                yield said([what, done.passed, done.was_interrupted, done.report.name, told[-1:]])
+                yield said([what, done.passed, done.was_interrupted, done.report.name, reported[-1:]])
                 yield json.dumps(kept, sort_keys=True, default=str).replace(name, "HERE")
                 yield said(sorted(path.name for path in place.iterdir()))
                 for text in ("pins.vcd", "usart.txt", "coverage.txt"):
@@ -300,7 +300,7 @@ def folders(_draw: Random) -> Iterator[str]:
 
 
 def numbers(_draw: Random) -> Iterator[str]:
-    """Give the adapter's firmware its numbers, for each robot; and round what is told of things."""
+    """Give the adapter's firmware its numbers, for each robot; and round what is reported of things."""
     with TemporaryDirectory(prefix="p2os-test-") as name:
         scenario = dict(scenarios(Path(name)))["firmware"]
     for robot in ("p2dx", "p3at", "amigo"):

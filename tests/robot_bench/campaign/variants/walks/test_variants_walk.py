@@ -235,11 +235,11 @@ def versions(draw: Random) -> Iterator[str]:
             def close(self) -> None:
                 """Nothing is to be ended."""
 
-        told: list[object] = []
+        reported: list[object] = []
         Against(Backwards(), other).run(
-            [mine] * 3, lambda place, done: told.append([place, done[0].failures, done[1]]), anew=True
+            [mine] * 3, lambda place, done: reported.append([place, done[0].failures, done[1]]), anew=True
         )
-        yield said(told)
+        yield said(reported)
     places = [("a.c", 3), ("a.c", 4), ("a.c", 6), ("a.c", 9), ("b.c", 5), ("x.h", 7)]
     for _ in range(80):
         rows = [

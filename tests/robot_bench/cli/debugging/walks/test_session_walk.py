@@ -120,16 +120,16 @@ def page(draw: Random) -> Iterator[str]:
 
 
 class Port:
-    """GDB's port: keeps what it is told."""
+    """GDB's port: keeps what it is reported."""
 
     def __init__(self) -> None:
-        self.told: list[object] = []
+        self.reported: list[object] = []
 
     def serve(self, _target: object, wait_s: float) -> None:
-        self.told.append(wait_s)
+        self.reported.append(wait_s)
 
     def stopped(self, stop: object, why: str) -> None:
-        self.told.append((stop, why))
+        self.reported.append((stop, why))
 
 
 def gdb(draw: Random) -> Iterator[str]:
@@ -178,8 +178,8 @@ def gdb(draw: Random) -> Iterator[str]:
         beside.changed()
         waits = let_go(run, draw.choice((1, 2, 5)))
         beside.serve(0.25)
-        yield f"{kind} {is_set} {waits} {said(port.told)} {beside.machine is run.session.chosen.machine}"
-        port.told.clear()
+        yield f"{kind} {is_set} {waits} {said(port.reported)} {beside.machine is run.session.chosen.machine}"
+        port.reported.clear()
         yield from shown(run)
     yield tried(lambda: beside.left(was_killed=True, is_lost=False))
     shutil.rmtree(folder)

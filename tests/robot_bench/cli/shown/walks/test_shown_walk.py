@@ -204,9 +204,9 @@ def fleet_hands(draw: Random) -> Iterator[str]:
         command = RunCommand(
             do=draw.choice(("drive", "drive", "stop")), robot=robot, forward_mps=draw.choice((0.0, 0.3))
         )
-        told = [tried(made.do, robot, words) if draw.random() < 0.4 else "", tried(made.ask, command, clock),
+        reported = [tried(made.do, robot, words) if draw.random() < 0.4 else "", tried(made.ask, command, clock),
                 tried(made.drive_on, clock)]  # fmt: skip
-        yield said([robot, words, command.do, told, [one.now for one in benches.values()]])
+        yield said([robot, words, command.do, reported, [one.now for one in benches.values()]])
         yield said([(one.robot, one.at, one.words) for one in made.done[-3:]])
 
 
@@ -221,9 +221,9 @@ def looks(_draw: Random) -> Iterator[str]:
     panel = ViewPanel("a", "A", ("x",), look)
     made = LookedPanels([panel])
     for at in (0, 1, LOOK_NS - 1, LOOK_NS, LOOK_NS + 1, 2 * LOOK_NS, 3 * LOOK_NS):
-        told = [made.asked("a", "x"), made.asked("b", "x"), made.is_due(at)]
+        reported = [made.asked("a", "x"), made.asked("b", "x"), made.is_due(at)]
         made.look(at, at // 2)
-        yield said([at, told, counts])
+        yield said([at, reported, counts])
     for number in range(MOST_LOOKS + 2):
         made.asked("a", str(number))
     made.look(9 * LOOK_NS, 5)

@@ -132,7 +132,7 @@ def judged(goal: Goal, run: list[Event], draw: Random) -> Iterator[str]:
     """Say when a goal is decided, and what becomes of it, by a judge and by one that goes on from a saved state."""
     first, second = GoalJudge([goal]), GoalJudge([goal])
     cut, saved, end = draw.randrange(len(run)), draw.randrange(len(run)), run[-1].t + draw.choice((0, 50, 500)) * MS
-    told = ""
+    reported = ""
     for place, event in enumerate(run):
         first.feed([event])
         if place + 1 == len(run) or run[place + 1].t > event.t:
@@ -143,8 +143,8 @@ def judged(goal: Goal, run: list[Event], draw: Random) -> Iterator[str]:
             second.feed([event])
             if place + 1 == len(run) or run[place + 1].t > event.t:
                 second.advance_to(event.t)
-        if not told and (found := first._decided[0]) is not None:
-            told = f"{event.t // MS} {found.met} {found.says!r} {said(found.robustness)} {found.unit}"
+        if not reported and (found := first._decided[0]) is not None:
+            reported = f"{event.t // MS} {found.met} {found.says!r} {said(found.robustness)} {found.unit}"
     for one in (first, second):
         one.advance_to(end)
     planned = draw.choice((0, end, end + S))
@@ -152,7 +152,8 @@ def judged(goal: Goal, run: list[Event], draw: Random) -> Iterator[str]:
     if at_end != other:
         yield f"by a saved state: {said(other)}"
     outcome = at_end.outcome
-    yield f"  {told or '-'} | {outcome.met} {outcome.says!r} {said(outcome.robustness)} {outcome.unit} {at_end.is_open}"
+    judged = f"{outcome.met} {outcome.says!r} {said(outcome.robustness)} {outcome.unit} {at_end.is_open}"
+    yield f"  {reported or '-'} | {judged}"
     found = first.missed, first.margins(end), first.finish(RunEnd(end, planned))
     yield f"  {first.has_ended_run} {' '.join(map(said, found))}"
 
