@@ -233,7 +233,8 @@ def program(draw: random.Random, place: Place, acts: int, **options: Any) -> Ite
     """Yield what a robot answers, what it is sent, and what is logged, whatever a program does."""
     log, heard, kept = getLogger("p2os.client"), list[str](), Said()
     log.addHandler(kept)
-    level, log.level = log.level, 1
+    level = log.level
+    log.setLevel(1)
     try:
         with patch.object(threading, "Thread", StillThread), patch.object(robot, "exit_on_signals", lambda: None):
             it = Robot("tcp:robot", opener=place.open, clock=place, **options)
@@ -263,7 +264,7 @@ def program(draw: random.Random, place: Place, acts: int, **options: Any) -> Ite
             yield tried(it.connect) + place.taken()
     finally:
         log.removeHandler(kept)
-        log.level = level
+        log.setLevel(level)
 
 
 def usual(draw: random.Random) -> Iterator[str]:
