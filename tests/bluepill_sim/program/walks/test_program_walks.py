@@ -5,6 +5,7 @@ import struct
 import sys
 import tempfile
 from collections.abc import Iterable, Iterator
+from importlib import resources
 from pathlib import Path
 from types import SimpleNamespace
 from unittest.mock import patch
@@ -565,7 +566,8 @@ def versions(draw: random.Random) -> Iterator[str]:
 
 
 def lines_of_versions(draw: random.Random) -> Iterator[str]:
-    image = load_image(FOLDERS / "bluepill_sim" / "analysis" / "silicon" / "pins.elf")
+    with resources.as_file(resources.files("bluepill_sim.analysis.silicon") / "pins.elf") as path:
+        image = load_image(path)
     start, held = image.segments[0]
     for one in draw.sample(mutants(image, range(start + 0x140, start + len(held), 2)), 6):
         other = one.image(image)
