@@ -253,8 +253,7 @@ class Chip(Stateful):
     def _advance(self, limit_ns: Nanos, go_on: Callable[[int], None]) -> ChipReached:
         processor, engine, clock, fabric = self.processor, self.engine, self._clock, self.fabric
         while True:
-            # A core that a debugger halts stands still for as long as is wanted, within a block as well.
-            may_end = not engine.is_inside_block or self._frozen_since is not None
+            may_end = self._may_end
             if may_end:
                 self._act()
             now = clock.ns_of(engine.cycle)
@@ -508,9 +507,14 @@ class Chip(Stateful):
         self.engine.shared.waits = is_waiting = self.parts.flash.is_busy and self.engine.pc < SYSTEM_MEMORY_BASE
         return is_waiting
 
+    @property
+    def _may_end(self) -> bool:
+        """Whether time may stop here; a core that a debugger halts stands still for long, within a block as well."""
+        return not self.engine.is_inside_block or self._frozen_since is not None
+
     def _pass_time(self, limit_ns: Nanos) -> None:
         engine = self.engine
-        if not engine.is_inside_block or self._frozen_since is not None:
+        if self._may_end:
             engine.cycle = max(engine.cycle, self._next_cycle(limit_ns))
             return
         # What ends the wait is no boundary of the program: SysTick and the limit wait for one.

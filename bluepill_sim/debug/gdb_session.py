@@ -19,7 +19,7 @@ from bluepill_sim.debug.monitor import Monitor
 from bluepill_sim.debug.packets import MAX_BYTES
 from bluepill_sim.debug.target_description import FLASH_PAGE_BYTES, memory_map_xml, target_xml
 from bluepill_sim.errors import BluePillError
-from bluepill_sim.stm32f103 import FLASH_BASE, FLASH_BYTES_FITTED
+from bluepill_sim.stm32f103 import FLASH_BASE, FLASH_BYTES_FITTED, without_alias
 from simbase.terminal import readable
 
 _OK, _NOT_SUPPORTED = b"OK", b""
@@ -254,7 +254,7 @@ class GdbSession:
         return _OK
 
     def _erase_flash(self, address: int, size: int) -> bytes:
-        begin = address - FLASH_BASE if address >= FLASH_BASE else address
+        begin = without_alias(address) - FLASH_BASE
         if begin % FLASH_PAGE_BYTES or not 0 <= begin <= FLASH_BYTES_FITTED - size:
             return _NO_MEMORY
         self._flash[address] = b"\xff" * size

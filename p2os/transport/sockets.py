@@ -136,7 +136,7 @@ class SocketTransport:
         """Return what the far side sent if that was a line of text and nothing else, as the end of a message."""
         text = (self._first + waits).decode("ascii", "replace")
         line = text.removesuffix("\r\n")
-        is_line = "" != line != text and len(text) <= LONGEST_REASON and line.isprintable() and "\ufffd" not in line
+        is_line = line not in {"", text} and len(text) <= LONGEST_REASON and line.isprintable() and "\ufffd" not in line
         return f": {line}" if is_line else ""
 
 

@@ -31,6 +31,16 @@ movs r1, #1
 str r1, [r0, #0]
 """
 
+#: Clocks port A and makes PA0 and PA1 push-pull outputs (RM0008, 7.3.7, 9.2.1). Leaves its address in r0, uses r1.
+PORT_A_OUT = """
+mov32 r0, #0x40021018
+movs r1, #4
+str r1, [r0, #0]
+mov32 r0, #0x40010800
+mov32 r1, #0x44444433
+str r1, [r0, #0]
+"""
+
 _CONDITIONS = {"eq": 0, "ne": 1, "cs": 2, "cc": 3, "mi": 4, "pl": 5, "ge": 10, "lt": 11, "al": 14}
 _SPECIAL = {"apsr": 0, "ipsr": 5, "msp": 8, "psp": 9, "primask": 16, "basepri": 17, "faultmask": 19, "control": 20}
 _PLAIN = {

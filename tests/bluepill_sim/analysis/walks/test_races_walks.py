@@ -30,7 +30,7 @@ from bluepill_sim.fabric.subscriptions import EDGE
 from bluepill_sim.program.image import Image, Symbol, SymbolTable
 from bluepill_sim.program.line_table import LineRow, LineTable
 from bluepill_sim.spans import to_nanos
-from tests.bluepill_sim.machine import Machine
+from tests.bluepill_sim.machine import PORT_A_OUT, Machine
 from tests.tools.suite.approved import Trace, judge_of, said, tried
 
 
@@ -217,13 +217,9 @@ def clocks(draw: random.Random) -> Iterator[str]:
 
 
 #: PA1 flips by a loop, PA0 by SysTick in the same register: what an interrupt does between the two is lost.
-FLIPS = """
-mov32 r0, #0x40021018
-movs r1, #4
-str r1, [r0, #0]
-mov32 r0, #0x40010800
-mov32 r1, #0x44444433
-str r1, [r0, #0]
+FLIPS = (
+    PORT_A_OUT
+    + """\
 mov32 r1, #0xE000E010
 mov32 r2, #{reload}
 str r2, [r1, #4]
@@ -244,6 +240,7 @@ movs r3, #1
 str r2, [r1, #0]
 bx lr
 """
+)
 
 
 def seen_of(report: RaceReport) -> list[object]:

@@ -4,22 +4,19 @@ import random
 from collections.abc import Callable, Iterator
 
 from bluepill_sim.board import BluePill
-from tests.bluepill_sim.machine import Machine
+from tests.bluepill_sim.machine import PORT_A_OUT, Machine
 from tests.tools.suite.approved import Trace, judge_of, said, tried
 
 #: PA0 and PA1 count.
-FLIPS = """
-mov32 r0, #0x40021018
-movs r1, #4
-str r1, [r0, #0]
-mov32 r0, #0x40010800
-mov32 r1, #0x44444433
-str r1, [r0, #0]
+FLIPS = (
+    PORT_A_OUT
+    + """\
 movs r3, #1
 again: str r3, [r0, #12]
 adds r3, #1
 b again
 """
+)
 #: A program that faults, or lasts.
 SOURCES = (
     "svc #0\nlog #1",

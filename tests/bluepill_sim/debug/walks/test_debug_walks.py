@@ -26,19 +26,15 @@ from bluepill_sim.debug.packets import MAX_BYTES, PacketReader, checksum, frame,
 from bluepill_sim.debug.sampler import VariableSampler
 from bluepill_sim.debug.semihosting import Semihosting
 from bluepill_sim.program.variables import NumberForm, Variable
-from tests.bluepill_sim.machine import Machine
+from tests.bluepill_sim.machine import PORT_A_OUT, Machine
 from tests.tools.examples import EXAMPLES
 from tests.tools.suite.approved import Trace, judge_of, said
 
 SYSTICK = 15
 #: SysTick each 3000 cycles; a loop that calls, writes SRAM and sets a pin; what prints; a division that faults.
-PROGRAM = """
-mov32 r0, #0x40021018
-movs r1, #4
-str r1, [r0, #0]
-mov32 r0, #0x40010800
-mov32 r1, #0x44444433
-str r1, [r0, #0]
+PROGRAM = (
+    PORT_A_OUT
+    + """\
 mov32 r0, #0xE000E014
 mov32 r1, #2999
 str r1, [r0, #0]
@@ -70,6 +66,7 @@ adds r3, #1
 str r3, [r2, #0]
 bx lr
 """
+)
 PLACES = ("start", "loop", "work", "tick", "stop", "default")
 
 
