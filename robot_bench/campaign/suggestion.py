@@ -249,10 +249,12 @@ free_m = 0.8
 within_s = 1.0
 ends_run = "missed"
 
-[[goal]]                # a turn ends where everything is free
+[[goal]]                # a turn ends where everything is free; dodge's long ones after 177 degrees at most
 kind = "no_idle_turn"
 ${blind}free_m = 0.8
 within_s = 0.5
+long_deg = 180.0
+apart_m = 0.55
 ends_run = "missed"
 
 [[goal]]                # nothing sees what is behind

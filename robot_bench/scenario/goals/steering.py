@@ -5,7 +5,6 @@ a contact. The sides are those of a Pioneer's front ring, sonar 2 to 4 left and 
 others. Ranges are as old as the ring is slow: each sonar of eight is new every 0.4 s.
 
 The measure of a goal is the share that is left of what it allows: 1 at best, so that it hides no other goal's margin
-from collections.abc import Mapping
 from a search.
 
 Invariant: where no range is known yet, nothing is missed.
@@ -13,7 +12,7 @@ Invariant: where no range is known yet, nothing is missed.
 
 import math
 from collections.abc import Mapping
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from p2os.toml_record import Record
 from p2os.toml_schema import Key
@@ -218,7 +217,7 @@ class TurnsLong(Watch):
 class _NotLong(Watch):
     """Something that must not last: the longest time from pose to pose is measured."""
 
-    STATE = ("_ranges", "_since", "_longest", "_longest_at")
+    STATE: ClassVar[tuple[str, ...]] = ("_ranges", "_since", "_longest", "_longest_at")
     kinds = (Ranges, Pose)
     #: What is said of it.
     words = ""
@@ -263,10 +262,12 @@ class SteersAwayTable(SidesTable):
 
 
 class NoIdleTurnTable(Record):
-    """What is free, and for how long it may turn there."""
+    """What is free, for how long it may turn there, and which turns may be long whatever it sees."""
 
     free_m: _Free
     within_s: InTime
+    long_deg: Annotated[float, Key(least=0, most=3600, doc="so far a long turn may go, whatever is free")] = 0.0
+    apart_m: Annotated[float, Key(least=0, most=100, doc="what begins nearer to the last turn is soon after it")] = 0.5
 
 
 class SteersAway(_NotLong):
@@ -286,16 +287,46 @@ class SteersAway(_NotLong):
 
 
 class NoIdleTurn(_NotLong):
-    """The robot does not go on turning on the spot where everything is free."""
+    """The robot does not go on turning on the spot where everything is free, but for turns that are long on purpose."""
 
+    STATE = ("_last", "_ended", "_goes_back", "_is_long_due", "_turned")
     words = "it turned on the spot where everything was free"
 
     def __init__(self, table: NoIdleTurnTable) -> None:
         super().__init__(table.within_s)
-        self._free_mm = 1000 * table.free_m
+        self._free_mm, self._apart_um = 1000 * table.free_m, table.apart_m * MICRO
+        self._long_rad = math.radians(table.long_deg)
+        self._last: Pose | None = None
+        #: Where the last turn ended, and whether it went back since it last went forward.
+        self._ended: Pose | None = None
+        self._goes_back = False
+        #: Of the turn that goes on: whether it may be a long one, and by how much it has turned, radians.
+        self._is_long_due = False
+        self._turned: float | None = None
 
     def is_bad(self, pose: Pose) -> bool:
-        return _spins(pose) and self._ranges is not None and min(self._ranges.mm, default=0) > self._free_mm
+        last, self._last = self._last, pose
+        if not _spins(pose):
+            if self._turned is not None:
+                self._ended, self._turned = last, None
+            if abs(pose.speed_mps) > DRIVES_MPS:
+                self._goes_back = pose.speed_mps < 0
+            return False
+        if self._turned is None or last is None:
+            self._turned, self._is_long_due = 0.0, self._may_be_long(pose)
+        else:
+            self._turned += math.remainder(pose.heading_rad - last.heading_rad, math.tau)
+        if self._is_long_due and abs(self._turned) < self._long_rad:
+            return False
+        return self._ranges is not None and min(self._ranges.mm, default=0) > self._free_mm
+
+    def _may_be_long(self, pose: Pose) -> bool:
+        """Tell whether a turn that begins here is soon after another, after going back, or between two things."""
+        ended = self._ended
+        if self._goes_back or (ended and math.hypot(pose.x - ended.x, pose.y - ended.y) < self._apart_um):
+            return True
+        mm = self._ranges.mm if self._ranges is not None else ()
+        return all(any(one <= len(mm) and mm[one - 1] <= self._free_mm for one in side) for side in (LEFT, RIGHT))
 
 
 class BacksOnPathTable(Record):
@@ -360,8 +391,11 @@ KINDS: Mapping[str, GoalKind] = {
     ),
     "no_idle_turn": GoalKind(
         NoIdleTurnTable,
-        lambda table: f"turns on the spot for no longer than {table.within_s:g} s where {table.free_m:g} m are free",
-        NoIdleTurn, doc="it does not go on turning on the spot for longer than that where every sonar is free",
+        lambda table: f"turns on the spot for no longer than {table.within_s:g} s where {table.free_m:g} m are free"
+        + (f", long turns beyond {table.long_deg:g} degrees" if table.long_deg else ""),
+        NoIdleTurn, doc="it does not go on turning on the spot for longer than that where every sonar is free; a turn "
+        "that begins nearer than `apart_m` to the last, after going back, or with something on both sides is judged "
+        "once it has turned `long_deg`",
     ),
     "backs_on_path": GoalKind(
         BacksOnPathTable, lambda table: f"goes back only within {table.off_m:g} m of the way that it came",

@@ -145,6 +145,52 @@ def test_what_has_a_reason_is_not_counted(kind: str, wheels: tuple[float, float]
     assert (found.met, found.robustness) == (True, 1)
 
 
+def idle_turn(*before: Event, deg: float = 130.0, x_m: float = 0.0, **arguments: Any) -> Any:
+    """Return the outcome of a turn by so much, 100 ms a pose, with everything free once it goes on."""
+    first, *on, _ = turned(5 * S, deg, x_m)[1:]
+    run = [*before, first, seen(5 * S + 1), *on]
+    return outcome("no_idle_turn", run, **{"free_m": 0.8, "within_s": 0.25, "long_deg": 100.0, **arguments})
+
+
+AFTER_A_TURN = (at(0), seen(1, NEAR), *turned(S, 20.0), at(3 * S, 0.1, left=0.1, right=0.1))
+
+
+@pytest.mark.parametrize(("deg", "met"), [(142.8, True), (143.0, False), (-142.8, True), (-143.0, False)])
+def test_goal_no_idle_turn_judges_a_turn_soon_after_another_once_it_is_a_long_one(deg: float, met: bool) -> None:
+    found = idle_turn(*AFTER_A_TURN, deg=deg)  # 0.3 s from a pose at 99.96 or 100.1 degrees on
+    assert (found.met, idle_turn(*AFTER_A_TURN, deg=deg, long_deg=0.0).met) == (met, False)
+    assert idle_turn(*AFTER_A_TURN, deg=99.9, within_s=0.01).met
+    assert not idle_turn(*AFTER_A_TURN, deg=120.0, within_s=0.01, long_deg=99.9).met
+
+
+@pytest.mark.parametrize(("x_m", "met"), [(0.299, True), (0.3, False), (-0.3, False)])
+def test_goal_no_idle_turn_takes_what_begins_near_the_last_turn_for_soon_after_it(x_m: float, met: bool) -> None:
+    assert idle_turn(*AFTER_A_TURN, x_m=x_m, deg=90.0, apart_m=0.3).met is met
+    assert idle_turn(*AFTER_A_TURN, x_m=0.49, deg=90.0).met is True  # 0.5 where nothing is said
+    assert idle_turn(*AFTER_A_TURN, x_m=0.5, deg=90.0).met is False
+
+
+def test_goal_no_idle_turn_judges_the_first_turn_at_once_but_for_one_after_going_back() -> None:
+    forward, back = (at(2 * S, left=rim, right=rim) for rim in (0.06, -0.06))
+    slowly = at(3 * S, left=0.04, right=0.04)  # no way
+    assert not idle_turn(at(0), seen(1), deg=90.0).met
+    assert not idle_turn(at(0), seen(1), forward, deg=90.0).met
+    assert idle_turn(at(0), seen(1), back, slowly, deg=90.0).met
+    assert not idle_turn(at(0), seen(1), back, forward, deg=90.0).met
+
+
+@pytest.mark.parametrize(("left_mm", "right_mm", "met"), [
+    (800, 800, True), (801, 800, False), (800, 801, False), (FREE, FREE, False),
+])  # fmt: skip
+def test_goal_no_idle_turn_lets_a_turn_between_things_on_both_sides_be_long(
+    left_mm: int, right_mm: int, met: bool
+) -> None:
+    assert idle_turn(at(0), seen(S, left_mm, right_mm), deg=90.0).met is met
+    beside = Ranges(t=S, mm=(100, FREE, FREE, FREE, FREE, FREE, FREE, 100))  # straight to the sides: passed already
+    assert not idle_turn(at(0), beside, deg=90.0).met
+    assert not idle_turn(at(0), Ranges(t=S, mm=(FREE, NEAR, NEAR)), deg=90.0).met  # a ring without a right side
+
+
 @pytest.mark.parametrize("kind", ["turns_away", "steers_away"])
 def test_sides_are_sonar_that_may_be_named(kind: str) -> None:
     within = {"within_s": 0.5} if kind == "steers_away" else {}
