@@ -537,7 +537,8 @@ C_FOLDERS = {
 #: Ideas that are longer than a file: their files call each other; `core.h`, `tim.h` and `interpreter.h` say so.
 C_IDEAS = {
     "core": {f"core/{name}.c" for name in ("access", "blocks", "exceptions", "faults", "polling", "run", "scs")},
-    "interpreter": {f"interpreter/{name}.c" for name in ("blocks", "decode", "execute", "hooks", "memory", "tidy")},
+    "interpreter": {f"interpreter/{name}.c" for name in ("blocks", "decode", "execute", "tidy")},
+    "memory": {f"interpreter/{name}.c" for name in ("hooks", "memory")},
     "timers": {f"devices/{name}.c" for name in ("tim", "tim_counter", "tim_inputs", "tim_outputs")},
 }
 
@@ -548,15 +549,25 @@ C_FUNCTION = re.compile(
     re.MULTILINE | re.DOTALL,
 )
 C_DATA = re.compile(r"^(?!static|extern)(?:const )?struct \w+ (\w+)(?:\[\w*\])? = ", re.MULTILINE)
+#: What a header makes by a macro at its outer level: functions of its list, or the head of one.
+C_MADE = re.compile(r"^(?P<macro>[A-Z][A-Z0-9_]*)\([^;{}]*?\)(?:\s*\{(?P<body>.*?^\}))?", re.MULTILINE | re.DOTALL)
+C_INCLUDE = re.compile(r'^#include "(?:[^"\n]*/)?([^"/\n]+)"', re.MULTILINE)
 #: A call, an address, a value of a field, a struct whose field is meant.
 C_USE = re.compile(r"(?<![\w.>])\w+(?=\()|(?<=&)\w+|(?<== )\w+(?=[,;}]|\s*\})|(?<![\w.>])\w+(?=\.)")
 
 
 def c_graph(texts: dict[str, str]) -> dict[str, set[str]]:
     """Return each file of C with those that define what it uses, by itself or by what headers have it do."""
+    included = {name: set(C_INCLUDE.findall(text)) for name, text in texts.items()}
     texts = {name: C_NO_CODE.sub(" ", text) for name, text in texts.items()}
     owners: dict[str, str] = {}
     inlined: dict[str, set[str]] = {}
+    for name, text in texts.items():
+        if name.endswith(".h"):
+            inlined[name.rpartition("/")[2]] = included[name] | {
+                word for made in C_MADE.finditer(C_MACRO.sub("", text))
+                for word in (made["macro"], *C_USE.findall(made["body"] or ""))
+            }  # fmt: skip
     own: dict[str, set[str]] = {name: set() for name in texts}
     for name, text in texts.items():
         inlined |= {macro: set(C_USE.findall(body)) for macro, body in C_MACRO.findall(text)}
@@ -571,7 +582,7 @@ def c_graph(texts: dict[str, str]) -> dict[str, set[str]]:
     graph = {}
     for name, text in texts.items():
         if name.endswith(".c"):
-            used, left = set(own[name]), set(C_USE.findall(text)) - own[name]
+            used, left = set(own[name]), (set(C_USE.findall(text)) | included[name]) - own[name]
             while left:
                 used.add(word := left.pop())
                 left |= inlined.get(word, set()) - used
@@ -614,13 +625,17 @@ def test_a_c_file_calls_nothing_of_a_folder_above_its_own() -> None:
         ("void pins(void)\n{\n    shown();\n}", "void show(void) { pins(); }", True),
         ("void pins(void)\n{\n    SHOWN(1);\n}", "void show(void) { pins(); }", True),
         ("void pins(void) { wave_kind.event(); }", "struct kind wave_kind = {.event = pins};", True),
+        ('#include "made.h"\nvoid pins(void) { }', "void show(void) { pins(); }", True),
+        ('#include "fabric.h"\nvoid pins(void) { }', "void show(void) { pins(); }", False),
         ("void pins(void) { show(); }", '/* pins(); */ void show(void) { put("pins()"); port->pins(); }', False),
         ("void pins(void) { show(); }", "static void pins(void) { }\nvoid show(void) { pins(); }", False),
     ],
 )  # fmt: skip
 def test_the_judge_sees_a_circle_in_c(pins: str, waves: str, is_seen: bool) -> None:
     header = "static inline void shown(void)\n{\n    show();\n}\n#define SHOWN(x) \\\n    show()\n"
-    assert bool(circles(c_graph({"fabric.h": header, "pins.c": pins, "waves.c": waves}))) is is_seen
+    made = "#define MAKE(name) static void name##_made(void)\nMAKE(first)\n{\n    show();\n}\n"
+    texts = {"a/fabric.h": header, "a/made.h": made, "pins.c": pins, "waves.c": waves}
+    assert bool(circles(c_graph(texts))) is is_seen
 
 
 @pytest.mark.soak
