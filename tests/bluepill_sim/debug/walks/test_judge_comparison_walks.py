@@ -27,7 +27,7 @@ SRAM, MS = 0x2000_0000, 1_000_000
 _CHANGED = (Reg.R3, Reg.R12, Reg.LR, Reg.SP, Reg.PRIMASK, Reg.BASEPRI, Reg.FAULTMASK, Reg.XPSR, Reg.CONTROL)
 #: One instruction of `PROGRAM`, and what stands there on the other board.
 _OTHERS = (
-    ("here: adds r3, #3", "here: adds r3, #4"), ("subs r5, #16", "subs r5, #8"),
+    ("subs r5, #16", "subs r5, #8"),
     ("stmia r5!, {r2, r3}", "stmia r5!, {r2, r4}"), ("svc #0", "nop"), ("adds r0, #2", "adds r0, #1"),
 )  # fmt: skip
 
