@@ -45,7 +45,8 @@ PINS = (
     "pins OUT/fault.bin --for 1ms", "pins OUT/asleep.bin --for 1ms --all",
 )  # fmt: skip
 RUN = (
-    *(f"run OUT/{name}.bin --for 300us" for name in BAD if name not in GIVEN_UP), "run OUT/unmodelled.bin --for 9us --strict",
+    *(f"run OUT/{name}.bin --for 300us" for name in BAD if name not in GIVEN_UP),
+    "run OUT/unmodelled.bin --for 9us --strict",
     "run dodge.elf --for 1ms --uart OUT/text", "run dodge.elf --for 1ms --raw", "run sensors.elf --for 1ms --itm OUT/i",
     "run sensors.elf --for 1ms --drive PA0=1.65V --drive PA0=z@10us --drive PA0=high@20us --drive PA0=0V@30us",
     "run sensors.elf --for 2ms --usart-baud 9600", "run codes.elf --for 2ms --swo OUT/swo", "run analog.elf --for 9us",
