@@ -121,8 +121,12 @@ def _boundaries(_: random.Random) -> Iterator[str]:
         yield f"{said(compare_boundaries(boards, end_ns, high))} {[board.pin('PA0').level for board in boards]}"
     for source in ("udf\ntick: nop\ncall: nop", "bkpt #1\ntick: nop\ncall: nop"):
         yield said(compare_boundaries((_board("own", source), _board("python", source)), MS))
+    boards = _board("own"), _board("python")
+    for end_ns in (1_000, 9_000):
+        boards[end_ns // 9_000].advance_to(end_ns)
+        yield _values(values_apart(boards))
     dice, boards = random.Random("boundaries"), (_board("own"), _board("python"))
-    for _number in range(24):
+    for _number in range(20):
         yield f"{_disturb(boards[dice.randrange(2)], dice)} {_values(values_apart(boards))}"
 
 
