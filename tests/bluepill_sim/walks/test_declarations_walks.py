@@ -94,9 +94,10 @@ def _shown_class(kind: type, body: Iterable[ast.stmt]) -> Iterator[str]:
         yield f"  made with {' '.join(how)}{' slots' if '__slots__' in vars(kind) else ''}"
         yield from (f"  {_shown_field(each)}" for each in fields(kind))
     else:
-        yield from (f"  {line}" for line in _declared(vars(kind), body))
-    if issubclass(kind, Enum):
-        yield from (f"  {name}={_shown(one.value)}" for name, one in kind.__members__.items())
+        members = kind.__members__ if issubclass(kind, Enum) else {}
+        yield from (f"  {name}={_shown(one.value)}" for name, one in members.items())
+        others = {name: value for name, value in vars(kind).items() if name not in members}
+        yield from (f"  {line}" for line in _declared(others, body))
 
 
 def _shown_field(each: "Field[object]") -> str:
