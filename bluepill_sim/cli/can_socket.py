@@ -283,9 +283,11 @@ class CanSocket:
             made.connect(address)
             made.send(b"")
         except ConnectionRefusedError as error:
-            raise CanSocketError(
-                f"cannot join {address}: nobody has it any more", hint=f"rm {address}, which an ended program has left"
-            ) from error
+            if isinstance(address, str):
+                shown, hint = address, f"rm {address}, which an ended program has left"
+            else:
+                shown, hint = f"{address[0]}:{address[1]}", "try again, or take another port"
+            raise CanSocketError(f"cannot join {shown}: nobody has it any more", hint=hint) from error
 
 
 def _address(text: str, where: str, *, is_open: bool) -> tuple[str, int]:

@@ -399,10 +399,11 @@ class Engine(Stateful):
             if view.page == address & -VIEW_BYTES:
                 place = {FETCH_ACCESS: (view.code, 4), READ_ACCESS: (view.data, 1)}
                 return place.get(access, (address, 2))
-        if access == FETCH_ACCESS and (0x4000_0000 <= address < 0x6000_0000 or address >= 0xA000_0000):
+        is_never_executed = 0x4000_0000 <= address < 0x6000_0000 or address >= 0xA000_0000
+        if access == FETCH_ACCESS and is_never_executed:
             return None
         hides = VIEWS_BASE <= address < VIEWS_BASE + VIEWS_BYTES
-        return (address - VIEWS_BYTES if hides else address), 7
+        return (address - VIEWS_BYTES if hides else address), 3 if is_never_executed else 7
 
     def _step(self, stop_at: int) -> Halt:
         hook = self._debug.begin_step(self.pc)

@@ -75,6 +75,8 @@ class Execution:
         self._semihosting = Semihosting(machine.board, self._print)
         self._reported_fault = False
         self._bkpt_at: int | None = None
+        #: The cycle up to which this run has printed: what it comes by again, after a way back, is not printed again.
+        self._printed_cycle = -1
         self._report = machine.board.chip.processor.on_fault
         if write is not None:
             machine.board.chip.processor.halts_on_bkpt = True
@@ -100,6 +102,7 @@ class Execution:
         """Begin the history anew: the machine has been written to."""
         self.history.begin()
         self._bkpt_at = None
+        self._printed_cycle = self.machine.board.cycle - 1
         self._reported_fault = self.machine.board.fault is not None
 
     # Forwards.
@@ -122,14 +125,16 @@ class Execution:
         return self._run(None, limit_ns)
 
     def pass_to(self, limit_ns: Nanos) -> None:
-        """Run to a time, past all stops."""
+        """Run to a time, past all stops but the program's own end."""
         board = self.machine.board
         with self._without_stops():
             while board.now_ns < limit_ns and not self._has_ended():
                 self.history.pass_by()
                 reached = self.machine.advance_to(min(limit_ns, board.now_ns + self._slice_ns))
                 if reached.halt is not None:
-                    self._stop_of(reached.halt.kind, reached.halt.address)
+                    stop = self._stop_of(reached.halt.kind, reached.halt.address)
+                    if stop is not None and stop.kind is StopKind.EXIT:
+                        break  # the program has ended: it stands there
                     self._pass_bkpt()
 
     def _run(self, until: _Place | None, limit_ns: Nanos | None = None) -> HaltReason:
@@ -210,13 +215,15 @@ class Execution:
             self.machine.board.request_stop()
 
     def _print(self, data: bytes) -> None:
-        if not self._is_replaying and self._write is not None:
+        cycle = self.machine.board.cycle
+        if not self._is_replaying and self._write is not None and cycle > self._printed_cycle:
+            self._printed_cycle = cycle
             self._write(data)
 
     # Backwards.
 
     def go_to(self, at_ns: Nanos) -> None:
-        """Go to a time, past all stops: forwards, or from the newest older state that is kept."""
+        """Go to a time, past all stops but the program's own end: forwards, or from the newest older state kept."""
         if at_ns < self.machine.board.now_ns:
             point = next((one for one in self.history.latest_first() if one.at_ns <= at_ns), None)
             if point is None:

@@ -38,6 +38,7 @@ _NOT_LINKED = {
     "ET_DYN": "a shared object or a position-independent program",
     "ET_CORE": "a core dump",
 }
+_MACHINES = {"EM_ARM": "ARM", "EM_AARCH64": "ARM (AArch64)", "EM_RISCV": "RISC-V", "EM_386": "x86"}
 _HINT = "an ELF, HEX or BIN file built for an STM32F103 at 0x08000000 is needed"
 #: chosen: so far a symbol without a size reaches; longer than any function that assembly holds.
 _UNSIZED_REACH_BYTES = 0x1_0000
@@ -209,8 +210,10 @@ def _parse_elf(data: bytes, name: str, digest: str) -> Image:
         elf = ELFFile(io.BytesIO(data))
         machine = elf["e_machine"]
         if machine != "EM_ARM" or elf.elfclass != 32 or not elf.little_endian:
+            bits = f"{elf.elfclass}-bit {'little' if elf.little_endian else 'big'}-endian"
             raise ImageError(
-                f"{name}: built for {_machine_name(machine)}, not for a 32-bit little-endian ARM",
+                f"{name}: built for {bits} {_machine_name(machine)}, and the BluePill is a Cortex-M3, a 32-bit "
+                "little-endian ARM",
                 hint="build with arm-none-eabi-gcc -mcpu=cortex-m3 -mthumb",
             )
         if elf["e_type"] != "ET_EXEC":
@@ -237,7 +240,8 @@ def _header_bytes(elf: "ELFFile", offset: int, size: int) -> int:  # type: ignor
 
 
 def _machine_name(machine: object) -> str:
-    return str(machine).removeprefix("EM_").replace("_", "-").lower()
+    """Return how the makers write the name of a machine of an ELF header, where that is known."""
+    return _MACHINES.get(str(machine)) or str(machine).removeprefix("EM_").replace("_", "-").lower()
 
 
 def _symbols(elf: "ELFFile") -> SymbolTable:  # type: ignore[name-defined]  # noqa: F821 - imported late

@@ -270,6 +270,23 @@ def test_a_path_left_by_a_program_that_died_is_told(network: CanNetwork, tmp_pat
     assert path.exists()
 
 
+def test_a_port_that_nobody_has_any_more_is_no_file_to_remove() -> None:
+    """Linux reports the refusal of a datagram at the next call: here at the first one that sends."""
+
+    made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+
+    def refused(_data: bytes) -> int:
+        raise ConnectionRefusedError
+
+    class Refused:
+        connect = made.connect
+        send = staticmethod(refused)
+
+    with made, pytest.raises(CanSocketError, match=r"^cannot join 127\.0\.0\.1:5: nobody has it any more") as caught:
+        CanSocket._join(Refused(), ("127.0.0.1", 5))  # type: ignore[arg-type]  # what is called of a socket
+    assert caught.value.hint == "try again, or take another port"
+
+
 def test_a_log_has_the_lines_of_candump() -> None:
     extended = CanFrame(identifier=0x12, data=b"\x01\xab", is_extended=True)
     remote = CanFrame(identifier=0x7FF, is_remote=True, remote_bytes=4)

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bluepill_sim.core.faults import FaultKind
 from tests.bluepill_sim.machine import Machine
 from tests.bluepill_sim.native.test_native_core import state
 
@@ -72,6 +73,15 @@ def test_an_instruction_is_taken_from_its_place_in_the_table(make: Any, number: 
 def test_a_literal_is_taken_from_its_place_in_the_table(make: Any, number: int) -> None:
     machine = aligned(make, store(TABLE + 4 * number, 0x77) + comparator(number, "literal") + ON, "b stop").run(200)
     assert machine.log == [1, 0x77]
+
+
+@pytest.mark.parametrize("address", [0x4002_1000, 0xE000_E000])
+def test_what_is_never_executed_is_not_behind_a_read_of_it_either(make: Any, address: int) -> None:
+    """The core keeps each page that it has found, and a page is found by what reaches for it first."""
+    read_then_branch = f"mov32 r1, #{address + 0x14}\nldr r2, [r1, #0]\nmov32 r1, #{address + 1}\nbx r1\n"
+    machine = aligned(make, store(TABLE, TWO) + comparator(0, "patched") + ON, read_then_branch).run(200)
+    assert machine.board.fault is not None
+    assert (machine.log, machine.board.fault.kind) == ([2, 0x1111_1111], FaultKind.EXECUTE_NEVER)
 
 
 @pytest.mark.parametrize(("number", "place"), [(6, "patched"), (0, "literal")])

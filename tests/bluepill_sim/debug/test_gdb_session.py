@@ -196,6 +196,22 @@ def test_a_run_with_a_debugger_is_the_run_without(boot, debug) -> None:
     assert gdb.board.snapshot() == plain.snapshot()
 
 
+def test_what_a_run_comes_by_again_is_printed_once(debug) -> None:
+    gdb = debug(PRINTS)
+    execution = gdb.execution
+    for at_ns in (1_000_000, 0, 1_000_000, 0):
+        execution.go_to(at_ns)
+        assert gdb.printed == b"HH"
+        assert gdb.board.now_ns < 5_000 + at_ns // 2  # no further than where the program ends
+    for packet in ("c", "bc", "c", "bs"):
+        assert gdb(packet).startswith("T05")
+    assert gdb.printed == b"HH"
+    execution.go_to(0)
+    execution.changed()  # what comes now is another run
+    execution.go_to(1_000_000)
+    assert gdb.printed == b"HHHH"
+
+
 def test_semihosting_prints_and_ends(debug) -> None:
     gdb = debug(PRINTS)
     assert gdb("c") == "T05thread:1;"  # BKPT 1 is the program's own

@@ -108,6 +108,16 @@ def bad_elf(**changes: int) -> bytes:
     return bytes(data)
 
 
+def elf_header(*, elf_class: int = 1, byte_order: int = 1, machine: int) -> bytes:
+    """The header of a program for another machine, and nothing behind it."""
+    order, word = "<>"[byte_order - 1], "I" if elf_class == 1 else "Q"
+    start = b"\x7fELF" + bytes([elf_class, byte_order, 1]) + bytes(9)
+    size, entry = (52, 32) if elf_class == 1 else (64, 56)
+    fields = struct.pack(f"{order}HHI3{word}IHHHHHH", 2, machine, 1, 0, size, 0, 0, size, entry,
+                         0, 40, 0, 0)  # fmt: skip
+    return start + fields + bytes(64)
+
+
 def elf_of_type(number: int) -> bytes:
     """The real ELF saying that it is something else than a program."""
     data = bytearray(FIRMWARE.read_bytes())
@@ -134,8 +144,11 @@ BAD_FILES = [
     (b":1000000000500020zz\n", "the Intel HEX file is damaged"),
     (b":020000040800F3\n:00000001FF\n", "the Intel HEX file is damaged"),
     (hex_record(1, 0, b"").encode(), "no code or data in it"),
-    (bad_elf(machine=62), "built for x86-64, not for a 32-bit little-endian ARM"),
-    (bad_elf(machine=243), "built for riscv"),
+    (bad_elf(machine=62), "built for 32-bit little-endian x86-64, and the BluePill is a Cortex-M3, a 32-bit"),
+    (bad_elf(machine=243), "built for 32-bit little-endian RISC-V, and"),
+    (elf_header(elf_class=2, machine=183), "built for 64-bit little-endian ARM (AArch64), and the BluePill"),
+    (elf_header(elf_class=2, machine=40), "built for 64-bit little-endian ARM, and the BluePill is a Cortex-M3"),
+    (elf_header(byte_order=2, machine=40), "built for 32-bit big-endian ARM, and"),
     (FIRMWARE.read_bytes()[:64], "the ELF file is damaged"),
     (FIRMWARE.read_bytes()[:0x200], "damaged"),
     (b"\x7fELF", "the ELF file is damaged"),

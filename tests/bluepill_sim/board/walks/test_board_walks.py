@@ -113,5 +113,49 @@ ACTS: tuple[Callable[[random.Random, BluePill], object], ...] = (
 )
 
 
-TRACES: dict[str, Trace] = {"faults": faults, "lives": lives}
+#: Sends "ok\\r\\n" and "no\\n" on USART1 at 500 kbit/s, sets PA0 and clears it again, and sleeps; again at each event.
+SPEAKS = (
+    "mov32 r0, #0x40021018\nmov32 r1, #0x4005\nstr r1, [r0, #0]\nmov32 r0, #0x40010800\nmov32 r1, #0x44444443\n"
+    "str r1, [r0, #0]\nmov32 r1, #0x444444B4\nstr r1, [r0, #4]\nmov32 r2, #0x40013800\nmovs r1, #16\nstr r1, [r2, #8]\n"
+    "mov32 r1, #0x2008\nstr r1, [r2, #12]\nagain: movs r1, #1\nstr r1, [r0, #16]\n"
+    + "".join(f"movs r1, #{byte}\nbl send\n" for byte in b"ok\r\nno\n")
+    + "mov32 r1, #0x10000\nstr r1, [r0, #16]\nmov32 r4, #900\nwait: subs r4, #1\nbne wait\nwfe\nb again\n"
+    "send: str r1, [r2, #4]\nfull: ldr r3, [r2, #0]\n.half 0x061B\nbpl full\nbx lr"
+)
+CONDITIONS = (
+    "pin PA0 high", "pin pa0 low", "pin PA0 changes", "Pin PA0 other", "pin PD7 low", "pin PA0", "usart1 sends ok",
+    "usart1 sends no", "usart1 sends never", "usart1 matches ^ok$", "usart1 matches o$", "usart1 matches [",
+    "usart9 sends x", "usart1 sends", "asleep", "awake", "fault", "nonsense", "", "usb sends x",
+)  # fmt: skip
+
+
+def conditions(_draw: random.Random) -> Iterator[str]:
+    """Yield how runs up to a condition end: on a board out of reset, and going on from where the last one ended."""
+    for wakes in (False, True):
+        board = Machine(SPEAKS, {}).deafen().board
+        for condition in CONDITIONS:
+            for span in ("60 us", "2 ms"):
+                if wakes:
+                    board.chip.processor.send_event()
+                found = tried(board.until, condition, span)
+                yield said([condition, span, found, board.now_ns, board.cycle, bytes(board.usart1.unread[-12:])])
+        for wanted, within in ((b"ok", "1 ms"), (b"no", 200_000), (b"never", "90 us"), (b"k\r", "5 us")):
+            board.chip.processor.send_event()
+            yield said(
+                [wanted, tried(board.usart1.expect, wanted, within=within), board.now_ns, bytes(board.usart1.unread)]
+            )
+    for boot0, boot1 in ((False, None), (True, False), (True, True)):
+        board = Machine(FLIPS, {}).deafen().board
+        board.chip.memory.write(0x2000_0000, bytes.fromhex("0050002001000020fee7"))
+        board.boot0 = boot0
+        board.pin("PB2").drive(boot1)
+        yield said([tried(board.reset), tried(board.run_for, "20 us"), f"{board.pc:x}", board.fault is not None])
+    for name in ("spi", "i2c"):
+        for bus in ("SPI1", "SPI3", "I2C1", "I2C9", "spi2"):
+            yield said([name, bus, tried(lambda name, bus: type(getattr(board, name)(bus)).__name__, name, bus)])
+    for select in ("PZ1", "PB0"):
+        yield tried(lambda select: type(board.spi("SPI1", None, select=select)).__name__, select)
+
+
+TRACES: dict[str, Trace] = {"faults": faults, "lives": lives, "conditions": conditions}
 test_a_walk_shows_what_was_approved = judge_of(__file__, TRACES)
