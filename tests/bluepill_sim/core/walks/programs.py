@@ -529,8 +529,9 @@ class ProgramWriter:
                 ),
                 (  # once and soon: before the core looks at the time for any other reason
                     f"mov32 r1, #0x40000000\nmov32 r0, #{self._dice.randrange(2, 60)}\nstr r0, [r1, #44]\n"
-                    "movs r0, #0\nstr r0, [r1, #36]\nmovs r0, #1\nstr r0, [r1, #12]\nmovs r0, #9\nstr r0, [r1, #0]\n"
-                    f"{self.arithmetic()}"
+                    "mov32 r2, #0xE000E100\nmov32 r0, #0x10000000\nstr r0, [r2, #0]\ncpsie i\n"
+                    "movs r0, #0\nmsr basepri, r0\nstr r0, [r1, #36]\nmovs r0, #1\nstr r0, [r1, #12]\n"
+                    f"movs r0, #9\nstr r0, [r1, #0]\n{self.arithmetic()}{self.delay()}"
                 ),
                 (
                     "mov32 r1, #0x40013800\nmovs r0, #69\nstr r0, [r1, #8]\nmov32 r0, #0x2088\nstr r0, [r1, #12]\n"
