@@ -25,7 +25,7 @@ from tests.tools.suite.approved import judge_of
 
 PROGRAMS, SLICES = 30, 40
 #: Programs of which it is counted, too, what C leaves to Python.
-COUNTED = range(0, PROGRAMS, 4)
+COUNTED = range(0, PROGRAMS, 2)
 #: Time between two looks, ns.
 SPANS_NS = (1, 125, 1_000, 4_000, 20_000, 60_000)
 #: The cores that go from block to block, and so show the same.
