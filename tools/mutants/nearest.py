@@ -39,14 +39,14 @@ TESTS_OF_C = {
         "tests/bluepill_sim/peripherals/walks/test_gpio_afio_exti_crc_walks.py"),
     "bluepill_sim/extension/source/fabric/edges.c": (
         "tests/bluepill_sim/fabric/walks/test_fabric_walks.py", "tests/bluepill_sim/analysis/waveforms",
-        "tests/bluepill_sim/native/test_native_memory.py", "tests/bluepill_sim/cli/test_whole_answers.py",
+        "tests/bluepill_sim/core/interpreter/test_heap.py", "tests/bluepill_sim/cli/test_whole_answers.py",
         "tests/bluepill_sim/analysis/test_silicon_pins.py"),
     "bluepill_sim/extension/source/fabric/ahead.c": (
         "tests/bluepill_sim/fabric/test_ahead.py", "tests/bluepill_sim/core/walks/test_program_walks.py",
         "tests/bluepill_sim/fabric/walks", "tests/bluepill_sim/peripherals/buses/test_bits_on_pins.py",
         "tests/bluepill_sim/fabric"),
     "bluepill_sim/extension/source/core/blocks.c": (
-        "tests/bluepill_sim/core/walks/test_program_walks.py", "tests/bluepill_sim/native/test_native_memory.py",
+        "tests/bluepill_sim/core/walks/test_program_walks.py", "tests/bluepill_sim/core/interpreter/test_heap.py",
         *(f"tests/bluepill_sim/core/interpreter/test_{name}.py"
           for name in ("exact", "continued", "own_core", "chaining")),
         *(f"tests/bluepill_sim/core/test_{name}.py" for name in ("block_log", "late_arrival", "core_parts", "time")),
@@ -63,7 +63,7 @@ TESTS_OF_C = {
         "tests/bluepill_sim/core/walks/test_program_walks.py",
         *(f"tests/bluepill_sim/core/interpreter/test_{name}.py"
           for name in ("tidy", "memory_bounds", "against_unicorn", "blocks_decode", "special", "own_core", "exact")),
-        "tests/bluepill_sim/native/test_native_memory.py",
+        "tests/bluepill_sim/core/interpreter/test_heap.py",
         "tests/bluepill_sim/core/interpreter", "tests/bluepill_sim/core/test_kernels.py",
         "tests/bluepill_sim/core/test_flag_vectors.py", "tests/bluepill_sim/native/test_native_core.py",
         "tests/bluepill_sim/core", "tests/bluepill_sim/native"),
@@ -71,8 +71,8 @@ TESTS_OF_C = {
         "tests/bluepill_sim/core/walks/test_program_walks.py",
         *(f"tests/bluepill_sim/core/test_{name}.py"
           for name in ("exceptions", "faults", "imprecise_faults", "late_arrival", "masks", "stacks", "time", "traps")),
-        *(f"tests/bluepill_sim/native/test_native_{name}.py"
-          for name in ("memory", "system", "core", "polling", "ambiguous")),
+        *(f"tests/bluepill_sim/native/test_native_{name}.py" for name in ("system", "core", "polling", "ambiguous")),
+        "tests/bluepill_sim/core/interpreter/test_heap.py",
         "tests/bluepill_sim/core/interpreter/test_exact.py", "tests/bluepill_sim/core/interpreter/test_own_core.py",
         "tests/bluepill_sim/core/interpreter/test_continued.py", "tests/bluepill_sim/core/test_flash_patch.py",
         "tests/bluepill_sim/board/test_resets.py", "tests/bluepill_sim/core", "tests/bluepill_sim/native",
