@@ -136,18 +136,22 @@ def _counting(made: type[ctypes.Structure], counts: Counter[str]) -> Callable[..
 
 
 def _asked(core: str, _: random.Random) -> Iterator[str]:
-    """Yield how often C calls Python, by what for, while programs run; what it can answer itself it does."""
+    """Yield how often C calls Python, by what for, while programs run, and how many rows of blocks it has written.
+
+    What it can answer itself it does; of a loop that waits it writes the last rows alone, however long it goes round.
+    """
     counts = Counter[str]()
     with ExitStack() as stack:
         stack.enter_context(patch.object(engine, "Callbacks", _counting(Callbacks, counts)))
         stack.enter_context(patch.object(fabric, "_Calls", _counting(fabric._Calls, counts)))
         board = _board(core)
     fresh = board.snapshot()
+    assert isinstance(board.chip.engine, engine.NativeEngine)
     for number in COUNTED:
         board.restore(fresh)
         lines = [f"program {number}"]
         for _line in _lines(board, number, *_image()[1][number], is_exact=core == "exact"):
-            lines.append(str(sorted(counts.items())))
+            lines.append(f"{board.chip.engine.shared.logged} {sorted(counts.items())}")
             counts.clear()
         yield "\n".join(lines)
 
