@@ -58,11 +58,15 @@ def growths(act: Callable[[], object]) -> list[int]:
     assert LIBC is not None
     LIBC.mallinfo2.restype = HeapUse
     seen = []
-    for _ in range(WARM + LOOKS):
-        act()
-        gc.collect()
-        now = LIBC.mallinfo2()
-        seen.append(now.used + now.mapped)
+    gc.freeze()  # what other tests have left: to look through it each time takes longer than what is measured
+    try:
+        for _ in range(WARM + LOOKS):
+            act()
+            gc.collect()
+            now = LIBC.mallinfo2()
+            seen.append(now.used + now.mapped)
+    finally:
+        gc.unfreeze()
     return [after - before for before, after in pairwise(seen[WARM - 1 :])]
 
 
