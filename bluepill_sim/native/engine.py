@@ -453,7 +453,6 @@ class NativeEngine(Engine):
 
     def _add_row(self, block: BasicBlock) -> None:
         start, size = block.start, block.end - block.start
-        self._known[start] = block
         self._code_pages.update(at >> _PAGE_SHIFT for at in (start & ~_FLASH_ALIAS, (block.end - 1) & ~_FLASH_ALIAS))
         memory = self._blocks.writable_at(start)
         host = None if memory is None else memory[2] + start - memory[0]
@@ -476,6 +475,9 @@ class NativeEngine(Engine):
             else (None, 0)
         )
         flags |= _WRITABLE * (compared[0] is not None)
+        if flags & _WRITABLE and start in self._known:  # C keeps what stood there before until it is to forget it
+            library().core_forget_range(self._state, start, start + 1)
+        self._known[start] = block
         if self._core.TELLS_PC:
             flags |= _NOTED
         elif not is_ambiguous(code, start):

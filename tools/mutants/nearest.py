@@ -27,21 +27,58 @@ TESTS_OF_C = {
         ("bluepill_sim/extension/source/registers", "bluepill_sim/extension/source/fabric/layout.h",
          "bluepill_sim/extension/source/interpreter/encodings.h"),
         ("tests/bluepill_sim/fabric/test_descriptions.py",)),
-    "bluepill_sim/extension/source/devices": ("tests/bluepill_sim/peripherals", "tests/bluepill_sim/native"),
+    # What few tests reach.
+    "bluepill_sim/extension/source/core/latency.c": (
+        "tests/bluepill_sim/analysis/test_races.py", "tests/bluepill_sim/analysis/walks/test_races_walks.py",
+        "tests/bluepill_sim/core/walks/test_program_walks.py", "tests/bluepill_sim/cli/test_whole_answers.py"),
+    "bluepill_sim/extension/source/core/forced.c": (
+        "tests/bluepill_sim/core/walks/test_program_walks.py", "tests/bluepill_sim/peripherals/pins/test_floating.py",
+        *(f"tests/bluepill_sim/native/test_native_{name}.py"
+          for name in ("registers", "warned", "ambiguous", "core", "random_registers")),
+        "tests/bluepill_sim/fabric/test_ahead.py",
+        "tests/bluepill_sim/peripherals/walks/test_gpio_afio_exti_crc_walks.py"),
+    "bluepill_sim/extension/source/fabric/edges.c": (
+        "tests/bluepill_sim/fabric/walks/test_fabric_walks.py", "tests/bluepill_sim/analysis/waveforms",
+        "tests/bluepill_sim/core/interpreter/test_heap.py", "tests/bluepill_sim/cli/test_whole_answers.py",
+        "tests/bluepill_sim/analysis/test_silicon_pins.py"),
+    "bluepill_sim/extension/source/fabric/ahead.c": (
+        "tests/bluepill_sim/fabric/test_ahead.py", "tests/bluepill_sim/core/walks/test_program_walks.py",
+        "tests/bluepill_sim/fabric/walks", "tests/bluepill_sim/peripherals/buses/test_bits_on_pins.py",
+        "tests/bluepill_sim/fabric"),
+    "bluepill_sim/extension/source/core/blocks.c": (
+        "tests/bluepill_sim/core/walks/test_program_walks.py", "tests/bluepill_sim/core/interpreter/test_heap.py",
+        *(f"tests/bluepill_sim/core/interpreter/test_{name}.py"
+          for name in ("exact", "continued", "own_core", "chaining")),
+        *(f"tests/bluepill_sim/core/test_{name}.py" for name in ("block_log", "late_arrival", "core_parts", "time")),
+        *(f"tests/bluepill_sim/native/test_native_{name}.py" for name in ("core", "system", "polling", "ambiguous")),
+        "tests/bluepill_sim/debug/cores/test_core_comparison.py", "tests/bluepill_sim/analysis/test_races.py"),
+    "bluepill_sim/extension/source/core/tlb.c": (
+        "tests/bluepill_sim/native/test_native_tlb.py", "tests/bluepill_sim/core/test_flash_patch.py",
+        "tests/bluepill_sim/core/walks/test_program_walks.py", "tests/bluepill_sim/native"),
+    "bluepill_sim/extension/source/devices": (
+        *(f"tests/bluepill_sim/native/test_native_{name}.py"
+          for name in ("random_registers", "registers", "timers", "dma", "streams")),
+        "tests/bluepill_sim/peripherals/sequences", "tests/bluepill_sim/peripherals", "tests/bluepill_sim/native"),
     "bluepill_sim/extension/source/interpreter": (
+        "tests/bluepill_sim/core/walks/test_program_walks.py",
         *(f"tests/bluepill_sim/core/interpreter/test_{name}.py"
           for name in ("tidy", "memory_bounds", "against_unicorn", "blocks_decode", "special", "own_core", "exact")),
+        "tests/bluepill_sim/core/interpreter/test_heap.py",
         "tests/bluepill_sim/core/interpreter", "tests/bluepill_sim/core/test_kernels.py",
         "tests/bluepill_sim/core/test_flag_vectors.py", "tests/bluepill_sim/native/test_native_core.py",
         "tests/bluepill_sim/core", "tests/bluepill_sim/native"),
     "bluepill_sim/extension/source/core": (
+        "tests/bluepill_sim/core/walks/test_program_walks.py",
         *(f"tests/bluepill_sim/core/test_{name}.py"
           for name in ("exceptions", "faults", "imprecise_faults", "late_arrival", "masks", "stacks", "time", "traps")),
         *(f"tests/bluepill_sim/native/test_native_{name}.py" for name in ("system", "core", "polling", "ambiguous")),
-        "tests/bluepill_sim/core/interpreter/test_exact.py", "tests/bluepill_sim/core", "tests/bluepill_sim/native",
+        "tests/bluepill_sim/core/interpreter/test_heap.py",
+        "tests/bluepill_sim/core/interpreter/test_exact.py", "tests/bluepill_sim/core/interpreter/test_own_core.py",
+        "tests/bluepill_sim/core/interpreter/test_continued.py", "tests/bluepill_sim/core/test_flash_patch.py",
+        "tests/bluepill_sim/board/test_resets.py", "tests/bluepill_sim/core", "tests/bluepill_sim/native",
         "tests/bluepill_sim/peripherals/walks/test_adc_dma_walks.py"),
     "bluepill_sim/extension/source/fabric": (
-        "tests/bluepill_sim/fabric",
+        "tests/bluepill_sim/fabric/walks", "tests/bluepill_sim/fabric",
         *(f"tests/bluepill_sim/peripherals/walks/test_{name}_walks.py" for name in ("tim", "spi_i2c")),
         "tests/bluepill_sim/test_timers.py", "tests/bluepill_sim/peripherals/tim/test_tim.py",
         "tests/bluepill_sim/core/test_core_parts.py", "tests/bluepill_sim/native"),
@@ -155,8 +192,10 @@ class Nearest:
     def _of_c(self, path: str) -> tuple[str, ...]:
         folders = next((tests for place, tests in TESTS_OF_C.items() if f"{path}/".startswith(f"{place}/")), ())
         stem = {*Path(path).stem.split("_")}
+        # Where a walk has its name, those of other sources show little of it.
+        has_own = any(WHOLE in _words(name) and stem & _words(name) for name in self._tests if name.startswith(folders))
         order = {
-            name: (not stem & _words(name), WHOLE not in _words(name), place)
+            name: (not stem & _words(name), WHOLE not in _words(name) or (has_own and not stem & _words(name)), place)
             for name in reversed(self._tests)
             for place, folder in reversed([*enumerate(folders)])
             if name == folder or name.startswith(f"{folder}/")

@@ -384,9 +384,11 @@ class ProgramWriter:
         change = (
             f"mov32 r3, #{bits}\nmov32 r5, #{mode}\nldr r2, [r1, #0]\n.half 0x439A\n.half 0x432A\nstr r2, [r1, #0]\n"
         )
-        at = CODE + 0x100
+        at, again = CODE + 0x100, self._label()
         return (
-            f"mov32 r1, #0x40010800\n{change}{change}str r5, [r7, #0]\nldr r2, [r1, #0]\n.half 0x439A\n"
+            f"mov32 r1, #0x40010800\nmov32 r0, #{self._dice.randrange(2, 5)}\n"
+            f"{again}: {change}subs r0, #1\nbne {again}\n"
+            f"{change}str r5, [r7, #0]\nldr r2, [r1, #0]\n.half 0x439A\n"
             "ldr r6, [r7, #0]\n"
             f".half 0x4332\nstr r2, [r1, #0]\nmov32 r0, #{at}\nmov32 r6, #0x439A680A\nstr r6, [r0, #0]\n"
             "mov32 r6, #0x600A432A\nstr r6, [r0, #4]\nmov32 r6, #0xBF004770\nstr r6, [r0, #8]\nadds r0, #1\n"
@@ -526,6 +528,12 @@ class ProgramWriter:
                     f"mov32 r1, #0x40000000\nmov32 r0, #{self._dice.randrange(70, 250)}\nstr r0, [r1, #44]\n"
                     "movs r0, #1\n"
                     "str r0, [r1, #12]\nstr r0, [r1, #0]\n"
+                ),
+                (  # once and soon: before the core looks at the time for any other reason
+                    f"mov32 r1, #0x40000000\nmov32 r0, #{self._dice.randrange(2, 60)}\nstr r0, [r1, #44]\n"
+                    "mov32 r2, #0xE000E100\nmov32 r0, #0x10000000\nstr r0, [r2, #0]\ncpsie i\n"
+                    "movs r0, #0\nmsr basepri, r0\nstr r0, [r1, #36]\nmovs r0, #1\nstr r0, [r1, #12]\n"
+                    f"movs r0, #9\nstr r0, [r1, #0]\n{self.arithmetic()}{self.delay()}"
                 ),
                 (
                     "mov32 r1, #0x40013800\nmovs r0, #69\nstr r0, [r1, #8]\nmov32 r0, #0x2088\nstr r0, [r1, #12]\n"

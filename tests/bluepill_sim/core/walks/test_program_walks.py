@@ -1,22 +1,31 @@
 """Programs at random, which all cores run alike, against traces that were approved: registers, exceptions, time."""
 
+import ctypes
 import json
 import random
 import zlib
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from functools import cache, partial
 from pathlib import Path
+from typing import Any
+from unittest.mock import patch
 
 from bluepill_sim import BluePill
 from bluepill_sim.core import Reg
 from bluepill_sim.core.unicorn_core import GENERAL
-from bluepill_sim.extension.library import core_chosen
+from bluepill_sim.extension.library import Callbacks, core_chosen
+from bluepill_sim.fabric import fabric
+from bluepill_sim.native import engine
 from bluepill_sim.program.image import Image
 from tests.bluepill_sim.core.walks.programs import assembled
 from tests.bluepill_sim.machine import STACK, listen
 from tests.tools.suite.approved import judge_of
 
 PROGRAMS, SLICES = 30, 40
+#: Programs of which it is counted, too, what C leaves to Python.
+COUNTED = range(0, PROGRAMS, 2)
 #: Time between two looks, ns.
 SPANS_NS = (1, 125, 1_000, 4_000, 20_000, 60_000)
 #: The cores that go from block to block, and so show the same.
@@ -112,7 +121,44 @@ def _lines(board: BluePill, number: int, base: int, stop: int, *, is_exact: bool
     yield f"{rows} {edges} {[str(warning) for warning in board.warnings]} {board.fault!r}"
 
 
-TRACES = {core: partial(_episodes, core) for core in (*CORES, "exact")}
+def _counting(made: type[ctypes.Structure], counts: Counter[str]) -> Callable[..., ctypes.Structure]:
+    """Return what makes a table of callbacks of which each call is counted by its name."""
+
+    def counted(name: str, call: Any) -> Any:
+        def count(*arguments: object) -> Any:
+            counts[name] += 1
+            return call(*arguments)
+
+        return type(call)(count)
+
+    names = [field[0] for field in made._fields_]
+    return lambda *calls: made(*(counted(name, call) for name, call in zip(names, calls, strict=True)))
+
+
+def _asked(core: str, _: random.Random) -> Iterator[str]:
+    """Yield how often C calls Python, by what for, while programs run, and how many rows of blocks it has written.
+
+    What it can answer itself it does; of a loop that waits it writes the last rows alone, however long it goes round.
+    """
+    counts = Counter[str]()
+    with ExitStack() as stack:
+        stack.enter_context(patch.object(engine, "Callbacks", _counting(Callbacks, counts)))
+        stack.enter_context(patch.object(fabric, "_Calls", _counting(fabric._Calls, counts)))
+        board = _board(core)
+    fresh = board.snapshot()
+    assert isinstance(board.chip.engine, engine.NativeEngine)
+    for number in COUNTED:
+        board.restore(fresh)
+        lines = [f"program {number}"]
+        for _line in _lines(board, number, *_image()[1][number], is_exact=core == "exact"):
+            lines.append(f"{board.chip.engine.shared.logged} {sorted(counts.items())}")
+            counts.clear()
+        yield "\n".join(lines)
+
+
+TRACES = {core: partial(_episodes, core) for core in (*CORES, "exact")} | {
+    f"{core} asked": partial(_asked, core) for core in ("native", "own")
+}
 test_a_walk_shows_what_was_approved = judge_of(__file__, TRACES)
 
 

@@ -26,6 +26,13 @@ RANGES = (
     (0xE003_FFFC, 0xE004_0014), (0xE004_00EC, 0xE004_00F8), (0xE004_02FC, 0xE004_030C), (0xE004_0FC4, 0xE004_1008),
     (0xE004_1FFC, 0xE004_2010),
 )  # fmt: skip
+#: Read after each step, for they show the state by other bits than it is kept in, and reading them changes nothing.
+_SHOWN = (
+    0xE000_0000, 0xE000_007C, 0xE000_0E00, 0xE000_0E80, 0xE000_0FB4, 0xE000_1000, 0xE000_1004, 0xE000_2000, 0xE000_2004,
+    0xE000_E100, 0xE000_E104, 0xE000_E180, 0xE000_E200, 0xE000_E204, 0xE000_E280, 0xE000_E300, 0xE000_E304,
+    0xE000_E400, 0xE000_E428, 0xE000_ED04, 0xE000_ED08, 0xE000_ED0C, 0xE000_ED10, 0xE000_ED14, 0xE000_ED18,
+    0xE000_ED20, 0xE000_ED24, 0xE000_ED28, 0xE000_EDFC, 0xE004_2004,
+)  # fmt: skip
 #: Addresses of the host, and what only a run sets.
 _OWN = {"sram", "flash", "scratch", "fault", "last", "logged", "exact_stops", "is_python"}
 _AIRCR, _DEMCR, _LAR, _TCR, _TER, _STIR = 0xE000_ED0C, 0xE000_EDFC, 0xE000_0FB0, 0xE000_0E80, 0xE000_0E00, 0xE000_EF00
@@ -68,6 +75,10 @@ class _Bus:
     def read(self, address: int, size: int = 4) -> str:
         """Return what a read gives."""
         return f"{self.system.read(address - PPB_BASE, size):x}"
+
+    def shown(self) -> str:
+        """Return what reads give that change nothing."""
+        return " ".join(map(self.read, _SHOWN))
 
     def write(self, address: int, size: int, value: int) -> str:
         """Return whether a write is known."""
@@ -145,10 +156,10 @@ def _walk(_: random.Random) -> Iterator[str]:
             done = f"{address:x}/{size} {bus.read(address, size)}"
         else:
             done = bus.line(dice) if kind < 9 else bus.wait(dice.choice((1, 7, 50, 100, 1_000)))
-        yield f"{done} {bus.changed()}"
+        yield f"{done} {bus.changed()}\n{bus.shown()} {bus.changed()}"
     for act in (bus.system.enable_trace, bus.system.reset, bus.system.lose_power):
         act()
-        yield f"{act.__name__} {bus.changed()}"
+        yield f"{act.__name__} {bus.changed()} {bus.shown()}"
     yield "\n".join(map(str, bus.board.warnings))
 
 

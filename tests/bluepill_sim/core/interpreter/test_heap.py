@@ -1,0 +1,112 @@
+"""What the library in C takes of the heap it gives back: of code that is written anew, and of boards that are gone.
+
+Only glibc says how much of the heap is in use. What Python keeps may move it by a little from one look to the next;
+what is lost each time moves it each time.
+"""
+
+import ctypes
+import gc
+from collections.abc import Callable
+from itertools import pairwise
+
+import pytest
+
+from bluepill_sim.analysis.edge_log import EdgeLog
+from bluepill_sim.extension.library import core_chosen
+from tests.bluepill_sim.machine import COUNTER_ON, PORT_A_OUT, Machine, listen
+
+LIBC = ctypes.CDLL(None) if hasattr(ctypes.CDLL(None), "mallinfo2") else None
+#: Looks at the heap, the first of which come while everything is still made once.
+WARM, LOOKS = 3, 6
+#: Has `movs r0, #n; bx lr` in SRAM, another n each round, and calls it; then it waits for the cycle counter.
+REWRITES = f"""
+{PORT_A_OUT}{COUNTER_ON}
+mov32 r4, #0x20001000
+mov32 r6, #0x20001001
+mov32 r5, #0x47702000
+movs r2, #0
+again: movs r1, #1
+.half 0x404D
+str r5, [r4, #0]
+dsb
+isb
+blx r6
+adds r2, #1
+mov32 r1, #0xE0001000
+ldr r3, [r1, #4]
+adds r3, #120
+wait: ldr r0, [r1, #4]
+.half 0x4298
+bcc wait
+b again
+"""
+
+pytestmark = pytest.mark.skipif(LIBC is None, reason="no glibc, which says how much of the heap is in use")
+
+
+class HeapUse(ctypes.Structure):
+    """`struct mallinfo2`."""
+
+    _fields_ = tuple(
+        (name, ctypes.c_size_t)
+        for name in ("arena", "ordblks", "smblks", "hblks", "mapped", "usmblks", "fsmblks", "used", "free", "keepcost")
+    )
+
+
+def growths(act: Callable[[], object]) -> list[int]:
+    """Return by how many bytes the heap grows each time that something is done, once it has been done some times."""
+    assert LIBC is not None
+    LIBC.mallinfo2.restype = HeapUse
+    seen = []
+    gc.freeze()  # what other tests have left: to look through it each time takes longer than what is measured
+    try:
+        for _ in range(WARM + LOOKS):
+            act()
+            gc.collect()
+            now = LIBC.mallinfo2()
+            seen.append(now.used + now.mapped)
+    finally:
+        gc.unfreeze()
+    return [after - before for before, after in pairwise(seen[WARM - 1 :])]
+
+
+@pytest.mark.parametrize("core", ["own", "exact"])
+def test_code_that_is_written_anew_takes_no_more_memory(core: str) -> None:
+    with core_chosen(core):
+        machine = Machine(REWRITES, {}).deafen()
+    assert min(growths(lambda: machine.run(100))) <= 0
+    assert machine.board.register("R2") > 20
+
+
+@pytest.mark.parametrize("core", ["own", "exact"])
+def test_a_board_that_is_gone_leaves_no_memory_behind(core: str) -> None:
+    def live() -> None:
+        with core_chosen(core):
+            machine = Machine(REWRITES, {})
+        board, log = machine.board, EdgeLog([1], [0])
+        pins = listen(board, [])
+        board.chip.record_blocks(100)
+        machine.run(30, slice_us=7)
+        board.restore(board.snapshot())
+        board.chip.stop_recording()
+        machine.run(60, slice_us=13)
+        for at_ns in range(100):
+            log.put(at_ns, 1, at_ns % 2)
+        pins.close()
+
+    assert min(growths(live)) <= 0
+
+
+@pytest.mark.parametrize("core", ["own", "exact"])
+def test_recording_anew_takes_no_more_memory(core: str) -> None:
+    with core_chosen(core):
+        machine = Machine(REWRITES, {}).deafen()
+
+    def again() -> None:
+        machine.board.chip.record_blocks(1000)
+        pins = listen(machine.board, [])
+        machine.run(20)
+        machine.board.chip.stop_recording()
+        pins.close()
+
+    assert min(growths(again)) <= 0
