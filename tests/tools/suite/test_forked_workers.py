@@ -1,0 +1,95 @@
+"""Workers that are forked from the first: one process collects, and each is a worker like any other."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+from tests.test_suite import OWN, ROOT
+
+SUITE = """
+import os, random, time
+from pathlib import Path
+import pytest
+
+NOTES = Path(__file__).parent / "notes"
+def note(text):
+    with NOTES.open("a") as file:
+        file.write(f"{text}\\n")
+note(f"collected {os.getpid()}")
+drawn = random.random
+
+@pytest.fixture(scope="session")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("own")
+
+@pytest.mark.parametrize("number", range(24))
+def test_each(number, folder, worker_id, capfd, request):
+    print(f"said by {number}")
+    os.write(2, f"written by {number}".encode())
+    time.sleep(0.02)  # so that all workers get some
+    assert capfd.readouterr() == (f"said by {number}\\n", f"written by {number}")
+    assert os.environ["PYTEST_XDIST_WORKER"] == worker_id == request.config.workerinput["workerid"]
+    assert folder.parent.name == f"popen-{worker_id}"
+    note(f"ran {number} {worker_id} {os.getpid()} {drawn()}")
+
+def test_of_what_is_shown():
+    print("shown", "once")
+    assert not "a failure"
+
+"""
+#: A worker that is forked ends at once, and another comes in its place.
+CRASH = """
+@pytest.mark.parametrize("number", range(24))
+def test_end(number, worker_id):
+    time.sleep(0.02)
+    try:
+        os.open(NOTES.with_name("ended"), os.O_CREAT | os.O_EXCL) if worker_id != "gw0" else None
+    except FileExistsError:
+        return
+    if worker_id != "gw0":
+        note(f"crash {worker_id} {os.getpid()}")
+        os._exit(3)
+"""
+#: More than the name of a socket may have.
+LONG = "long" * 30
+
+
+def run(folder: Path, suite: str, *options: str) -> tuple[int, str, list[list[str]]]:
+    """Return the exit code of a run, what it prints, and what its tests note, in words."""
+    for name in OWN:
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes((ROOT / name).read_bytes())
+    (folder / "tests" / "test_all.py").write_text(suite)
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST")}
+    words = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *options, "tests"]
+    done = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True, check=False, timeout=300)
+    notes = (folder / "tests" / "notes").read_text().splitlines()
+    return done.returncode, done.stdout + done.stderr, [line.split() for line in notes]
+
+
+def test_one_process_collects_three_run_under_their_names_and_one_that_crashes_is_replaced(tmp_path: Path) -> None:
+    code, said, notes = run(tmp_path, SUITE + CRASH, "-n", "3")
+    assert code == 1, said
+    assert "2 failed, 47 passed" in said
+    assert said.count("shown once") == 1
+    assert "said by" not in said
+    ran = [note[1:] for note in notes if note[0] == "ran"]
+    assert sorted(int(number) for number, *_ in ran) == list(range(24))
+    assert len({drawn for *_, drawn in ran}) == 24  # no two draw the same
+    (crashed,) = (note[1:] for note in notes if note[0] == "crash")
+    assert f"worker '{crashed[0]}' crashed while running" in said
+    processes = {(worker, process) for _, worker, process, _ in ran} | {tuple(crashed)}
+    names = [worker for worker, _ in processes]
+    assert {"gw0", "gw1", "gw2"} <= {*names}
+    assert len({*names}) == len(names)
+    collected = [note[1] for note in notes if note[0] == "collected"]
+    assert len(collected) == 2  # the first, and the one that came instead
+    assert collected[0] == next(process for _, worker, process, _ in ran if worker == "gw0")
+
+
+def test_each_collects_where_the_first_cannot_listen_and_what_cannot_be_collected_is_said_once(tmp_path: Path) -> None:
+    code, said, notes = run(tmp_path, f"{SUITE}import none_of_this_name", "-n", "2", "--basetemp", str(tmp_path / LONG))
+    assert code == 1, said
+    assert said.count("ERROR tests/test_all.py") == 1
+    assert [note[0] for note in notes] == ["collected"] * 2
