@@ -106,12 +106,15 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def register_workers(config: pytest.Config) -> None:
-    """Have all workers of xdist forked from the first of them when it has collected."""
+    """Have all workers of xdist forked from the first of them when it has collected, and say no more than is asked."""
+    from tests.tools.suite import fewer_messages
     from tests.tools.suite.forked_workers import FIRST, Controller, FirstWorker
 
     if not hasattr(config, "workerinput"):
         config.pluginmanager.register(Controller())
-    elif config.workerinput["workerid"] == FIRST:
+        return
+    fewer_messages.register(config)
+    if config.workerinput["workerid"] == FIRST:
         config.pluginmanager.register(FirstWorker(config))
 
 

@@ -13,8 +13,12 @@ from tools.check_coverage import merged
 
 ROOT = Path(__file__).parents[1]
 #: What a run of tests of its own needs of ours.
-OWN = ("pyproject.toml", "tests/conftest.py", "tests/tools/installed.py",
-       "tests/tools/suite/forked_workers.py", "tests/tools/suite/forked_workers_client.py")  # fmt: skip
+OWN = (
+    "pyproject.toml",
+    "tests/conftest.py",
+    "tests/tools/installed.py",
+    *(f"tests/tools/suite/{name}.py" for name in ("fewer_messages", "forked_workers", "forked_workers_client")),
+)
 PART = """
 def which(first):
     if first:

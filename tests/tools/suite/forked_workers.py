@@ -22,14 +22,13 @@ import xdist.remote
 from execnet.gateway_base import Popen2IO, WorkerPool
 
 from tests.tools.suite import forked_workers_client
+from tests.tools.suite.fewer_messages import interactor_of
 from tests.tools.suite.forked_workers_client import SOCKET
 
 #: The worker that collects.
 FIRST = "gw0"
 #: For how long it waits for each of the others once it has collected, in seconds; the longest message, in bytes.
 COME_S, MOST_BYTES = 10.0, 1 << 16
-#: xdist's class of what speaks with the controller; its module has no name.
-INTERACTOR = "WorkerInteractor"
 
 
 class Controller:
@@ -109,7 +108,7 @@ class FirstWorker:
         config.option.basetemp = basetemp
         config._tmp_path_factory._given_basetemp = Path(basetemp)
         config._tmp_path_factory._basetemp = None
-        interactor = next(each for each in config.pluginmanager.get_plugins() if type(each).__name__ == INTERACTOR)
+        interactor = interactor_of(config)
         interactor.workerid = workerinput["workerid"]
         connect(interactor.channel.gateway, pipes)
         interactor.sendevent("workerready", workerinfo=xdist.remote.getinfodict())

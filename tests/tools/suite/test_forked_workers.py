@@ -37,6 +37,27 @@ def test_of_what_is_shown():
     print("shown", "once")
     assert not "a failure"
 
+@pytest.fixture
+def ends_badly():
+    yield
+    raise OSError("at the end")
+
+def test_of_an_end(ends_badly):
+    pass
+
+def test_of_a_print():
+    print("printed")
+
+def test_of_a_skip():
+    pytest.skip("not here")
+"""
+#: A plug-in of the controller, which notes what it is told.
+REPORTS = """
+import os
+def pytest_runtest_logreport(report):
+    if "PYTEST_XDIST_WORKER" not in os.environ:
+        with open("tests/notes", "a") as file:
+            file.write(f"report {report.nodeid.rpartition(':')[2]} {report.when} {report.outcome}\\n")
 """
 #: A worker that is forked ends at once, and another comes in its place.
 CRASH = """
@@ -61,8 +82,9 @@ def run(folder: Path, suite: str, *options: str) -> tuple[int, str, list[list[st
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_bytes((ROOT / name).read_bytes())
     (folder / "tests" / "test_all.py").write_text(suite)
+    (folder / "noted_reports.py").write_text(REPORTS)
     environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST")}
-    words = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *options, "tests"]
+    words = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-p", "noted_reports", *options, "tests"]
     done = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True, check=False, timeout=300)
     notes = (folder / "tests" / "notes").read_text().splitlines()
     return done.returncode, done.stdout + done.stderr, [line.split() for line in notes]
@@ -71,7 +93,7 @@ def run(folder: Path, suite: str, *options: str) -> tuple[int, str, list[list[st
 def test_one_process_collects_three_run_under_their_names_and_one_that_crashes_is_replaced(tmp_path: Path) -> None:
     code, said, notes = run(tmp_path, SUITE + CRASH, "-n", "3")
     assert code == 1, said
-    assert "2 failed, 47 passed" in said
+    assert "2 failed, 49 passed, 1 skipped, 1 error" in said
     assert said.count("shown once") == 1
     assert "said by" not in said
     ran = [note[1:] for note in notes if note[0] == "ran"]
@@ -86,6 +108,17 @@ def test_one_process_collects_three_run_under_their_names_and_one_that_crashes_i
     collected = [note[1] for note in notes if note[0] == "collected"]
     assert len(collected) == 2  # the first, and the one that came instead
     assert collected[0] == next(process for _, worker, process, _ in ran if worker == "gw0")
+    reports = [note[1:] for note in notes if note[0] == "report"]
+    assert sorted(report for report in reports if report[0].startswith("test_of")) == [
+        ["test_of_a_print", "call", "passed"],
+        ["test_of_a_print", "teardown", "passed"],
+        ["test_of_a_skip", "call", "skipped"],
+        ["test_of_an_end", "call", "passed"],
+        ["test_of_an_end", "teardown", "failed"],
+        ["test_of_what_is_shown", "call", "failed"],
+        ["test_of_what_is_shown", "teardown", "passed"],
+    ]
+    assert {tuple(report[1:]) for report in reports if report[0].startswith("test_each")} == {("call", "passed")}
 
 
 def test_each_collects_where_the_first_cannot_listen_and_what_cannot_be_collected_is_said_once(tmp_path: Path) -> None:
