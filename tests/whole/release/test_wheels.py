@@ -55,9 +55,10 @@ PYTEST = ("-m", "pytest", "-q", "--import-mode=importlib", "-p", "no:cacheprovid
 PARTS = [part["name"] for part in PROJECT["tool"]["setuptools"]["ext-modules"]]
 
 
-#: Instead of a compiler: sees that what a source includes is there, and links what the checkout has built.
+#: Instead of a compiler: sees that what a source includes is there, links what the checkout built, and notes of what.
 LOOKING = """#!/bin/sh
 case " $* " in *" -shared "*) ;; *) exec {compiler} "$@" -E;; esac
+echo "$*" >> "$0.links"
 while [ "$1" != -o ]; do shift; done
 folder=${{2%/*}}
 cp "{root}/${{folder##*/}}/${{2##*/}}" "$2"
@@ -148,6 +149,19 @@ def test_a_source_distribution_has_every_source_of_its_parts(wheels: dict[str, P
     }
     assert [pattern for pattern, files in named.items() if not files] == []
     assert {path.relative_to(ROOT).as_posix() for files in named.values() for path in files} - found == set()
+
+
+@pytest.mark.slow
+def test_parts_that_are_built_at_the_same_time_share_no_object(wheels: dict[str, Path]) -> None:
+    """The ESP32's program is compiled for either revision of the board: with the other's pins it would start, too."""
+    linked = [
+        {Path(wheel.parent, word) for word in line.split() if word.endswith(".o")}
+        for wheel in wheels.values() for noted in wheel.parent.glob("looking-*.links")
+        for line in noted.read_text().splitlines()
+    ]  # fmt: skip
+    assert len(linked) == len(PARTS)
+    assert min(map(len, linked)) > 1
+    assert len(set().union(*linked)) == sum(map(len, linked))
 
 
 @pytest.mark.slow
