@@ -181,6 +181,10 @@ def test_a_data_file_that_is_left_out_of_a_wheel_is_named(tmp_path: Path) -> Non
     assert left_out("p2os", wheel) == ["p2os/capture/p2os.lua"]
 
 
+#: Tests of the emulator that take little: of images, of code that is not run, of variables.
+OF_THE_EMULATOR = ("alterations", "image", "static_code", "variables")
+
+
 def shortest_tests(place: Path, *names: str) -> Path:
     """Copy tests to where the checkout is not."""
     for name in ("tests/conftest.py", "tests/tools", *names):
@@ -223,7 +227,7 @@ def test_the_emulators_wheel_runs_a_program_where_nothing_else_is(
     place = shortest_tests(tmp_path, "tests/bluepill_sim", "robot_bench/firmware")
     for words in (
         ["-m", "bluepill_sim", "run", elf, "--for", "10ms"],
-        [*PYTEST, "tests/bluepill_sim/program"],
+        [*PYTEST, *(f"tests/bluepill_sim/program/test_{name}.py" for name in OF_THE_EMULATOR)],
     ):
         done = subprocess.run(
             [program, *words], cwd=place, env=clean_environment(),
