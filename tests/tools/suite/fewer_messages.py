@@ -30,6 +30,8 @@ class FewerMessages:
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Pass on what has something to say."""
+        if report.passed:
+            report.keywords = {}  # half of the message, which nobody reads there
         if report.when == "call" or not report.passed or report.sections:
             self._interactor.pytest_runtest_logreport(report)
 

@@ -4,8 +4,13 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
 
 from tests.test_suite import OWN, ROOT
+from tests.tools.suite import fewer_messages
 
 SUITE = """
 import os, random, time
@@ -126,3 +131,26 @@ def test_each_collects_where_the_first_cannot_listen_and_what_cannot_be_collecte
     assert code == 1, said
     assert said.count("ERROR tests/test_all.py") == 1
     assert [note[0] for note in notes] == ["collected"] * 2
+
+
+class Hook(list[object]):
+    """A hook, as a list of the plug-ins that have one."""
+
+    _remove_plugin = list.remove
+
+
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [("verbose", 1), ("xmlpath", "a.xml"), ("durations", 5), ("count_time", "spent.txt"), ("setupshow", True), ("", 0)],
+)
+def test_all_is_said_where_it_is_asked_for(option: str, value: object) -> None:
+    speaker: Any = type("WorkerInteractor", (), {})()
+    plugins: list[object] = [object(), speaker]
+    hook = SimpleNamespace(pytest_runtest_logreport=Hook(plugins), pytest_runtest_logstart=Hook(plugins))
+    manager = SimpleNamespace(get_plugins=lambda: plugins, register=plugins.append)
+    config: Any = SimpleNamespace(
+        option=SimpleNamespace(**{"verbose": 0, option: value}), pluginmanager=manager, hook=hook
+    )
+    fewer_messages.register(config)
+    assert (speaker in hook.pytest_runtest_logreport) is (speaker in hook.pytest_runtest_logstart) is bool(option)
+    assert len(plugins) == (2 if option else 3)
