@@ -110,11 +110,12 @@ def register_workers(config: pytest.Config) -> None:
     from tests.tools.suite import fewer_messages
     from tests.tools.suite.forked_workers import FIRST, Controller, FirstWorker
 
-    if not hasattr(config, "workerinput"):
+    workerinput = getattr(config, "workerinput", None)
+    if workerinput is None:
         config.pluginmanager.register(Controller())
         return
     fewer_messages.register(config)
-    if config.workerinput["workerid"] == FIRST:
+    if workerinput["workerid"] == FIRST:
         config.pluginmanager.register(FirstWorker(config))
 
 

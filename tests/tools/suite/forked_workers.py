@@ -44,9 +44,9 @@ class Controller:
 class FirstWorker:
     """A plugin of the first worker: listens from the beginning, and forks before the first test."""
 
-    def __init__(self, config: pytest.Config) -> None:
-        self._config: Any = config
-        self._workers = int(self._config.workerinput["workercount"])
+    def __init__(self, config: Any) -> None:
+        self._config = config
+        self._workers = int(config.workerinput["workercount"])
         self._forked: list[int] = []
         self._listener: socket.socket | None = None
         if self._workers > 1 and config.option.basetemp:

@@ -56,7 +56,7 @@ def test_of_a_print():
 def test_of_a_skip():
     pytest.skip("not here")
 """
-#: A plug-in of the controller, which notes what it is told.
+#: A plug-in, which notes the reports that reach the controller.
 REPORTS = """
 import os
 def pytest_runtest_logreport(report):
