@@ -9,6 +9,7 @@ import os
 import re
 import shutil
 import subprocess
+from copy import copy
 from pathlib import Path
 
 from setuptools import Extension, setup
@@ -68,7 +69,7 @@ class BuildParts(build_ext):
         super().build_extensions()
 
     def build_extension(self, ext: Extension) -> None:
-        """Build a part.
+        """Build a part, from objects of its own.
 
         Raises:
             CompileError: It does not compile.
@@ -76,8 +77,10 @@ class BuildParts(build_ext):
         if ext.name in OPTIMISED_WHOLE and self._is_gcc():
             ext.extra_compile_args = [*ext.extra_compile_args, *WHOLE]
             ext.extra_link_args = [*ext.extra_link_args, "-O2", *WHOLE]
+        own = copy(self)  # parts are built at the same time, and some of the same sources, by other flags
+        own.build_temp = str(Path(self.build_temp, ext.name))
         try:
-            super().build_extension(ext)
+            super(BuildParts, own).build_extension(ext)
         except CompileError as error:
             raise CompileError(
                 f"{ext.name} does not compile: {error} (the compiler's words stand above; "

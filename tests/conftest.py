@@ -4,7 +4,6 @@ import gc
 import os
 import random
 import sys
-from collections.abc import Iterable
 from copy import copy
 from pathlib import Path
 
@@ -88,7 +87,8 @@ def pytest_configure(config: pytest.Config) -> None:
         from tests.tools.suite.spent_time import TimeCounter
 
         config.pluginmanager.register(TimeCounter(config.rootpath / path, is_worker=hasattr(config, "workerinput")))
-    config.pluginmanager.register(TurnedFolders())
+    if config.pluginmanager.has_plugin("xdist"):
+        register_workers(config)
     # Here, since pytest rewrites its modules: after it is known where they are kept.
     from hypothesis import HealthCheck, Phase, settings
     from hypothesis.internal import entropy
@@ -105,28 +105,18 @@ def pytest_configure(config: pytest.Config) -> None:
     settings.load_profile("repeated")
 
 
-class TurnedFolder(pytest.Dir):
-    """A folder of tests that each worker begins to collect at a part of its own.
+def register_workers(config: pytest.Config) -> None:
+    """Have all workers of xdist forked from the first of them when it has collected, and say no more than is asked."""
+    from tests.tools.suite import fewer_messages
+    from tests.tools.suite.forked_workers import FIRST, Controller, FirstWorker
 
-    pytest rewrites the assertions of 500 files when they are first imported, 16 s of processor time, and keeps them:
-    workers that come to the files at the same moment would all do so.
-    """
-
-    def collect(self) -> list[pytest.Item | pytest.Collector]:
-        """Return what is in it, beginning with the worker's part."""
-        found: Iterable[pytest.Item | pytest.Collector] = super().collect()
-        found = list(found)
-        worker, workers = os.environ.get("PYTEST_XDIST_WORKER", "gw0"), os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")
-        first = len(found) * int(worker.removeprefix("gw")) // int(workers)
-        return found[first:] + found[:first]
-
-
-class TurnedFolders:
-    """A plugin, for the hook of a conftest.py is not asked about the folder it lies in."""
-
-    def pytest_collect_directory(self, path: Path, parent: pytest.Collector) -> TurnedFolder:
-        """Collect a folder so."""
-        return TurnedFolder.from_parent(parent, path=path)  # type: ignore[no-any-return]  # pytest says nothing of it
+    workerinput = getattr(config, "workerinput", None)
+    if workerinput is None:
+        config.pluginmanager.register(Controller())
+        return
+    fewer_messages.register(config)
+    if workerinput["workerid"] == FIRST:
+        config.pluginmanager.register(FirstWorker(config))
 
 
 def pytest_collection_finish() -> None:

@@ -12,6 +12,13 @@ from tests.tools.forked_python import PYTEST, forked_python
 from tools.check_coverage import merged
 
 ROOT = Path(__file__).parents[1]
+#: What a run of tests of its own needs of ours.
+OWN = (
+    "pyproject.toml",
+    "tests/conftest.py",
+    "tests/tools/installed.py",
+    *(f"tests/tools/suite/{name}.py" for name in ("fewer_messages", "forked_workers", "forked_workers_client")),
+)
 PART = """
 def which(first):
     if first:
@@ -40,7 +47,7 @@ def test_lines_and_branches_that_no_test_of_any_worker_reaches_are_counted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, workers: list[str], ways: str,
     missed: tuple[list[int], list[tuple[int, int]]],
 ) -> None:  # fmt: skip
-    for name in ("tests/conftest.py", "tests/tools/counted_lines.py", "tests/tools/installed.py", "pyproject.toml"):
+    for name in ("tests/tools/counted_lines.py", *OWN):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_bytes((ROOT / name).read_bytes())
     (tmp_path / "simbase").mkdir()
@@ -88,7 +95,7 @@ def test_children_keep_the_modules_that_they_compile(tmp_path: Path) -> None:
 def test_a_run_of_folders_leaves_out_long_tests_and_uses_all_cores(
     tmp_path: Path, options: list[str], ran: list[str], in_workers: bool
 ) -> None:
-    for name in ("tests/conftest.py", "tests/tools/installed.py", "pyproject.toml"):
+    for name in OWN:
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_bytes((ROOT / name).read_bytes())
     names = ("quick", "slow", "soak", "hardware")

@@ -461,6 +461,10 @@ class Installed:
         return self.origin
 
 
+#: What pip notes of a checkout that is installed in place.
+EDITABLE = '{"url": "file:///checkout", "dir_info": {"editable": true}}'
+
+
 def installations(draw: random.Random) -> Iterator[str]:
     """Say what is installed, what lacks, and how it is got, of distributions of each sort."""
     one = Installed(
@@ -490,6 +494,7 @@ def installations(draw: random.Random) -> Iterator[str]:
         with (
             patch.object(installation, "every_installed_point", lambda _group, points=points: iter(points)),
             patch.object(installation, "_pip_install", lambda: "pip install"),
+            patch.object(installation, "_origin", lambda _name: EDITABLE),
         ):
             yield said([dist.name for dist in installation.installed_distributions()])
             yield said(

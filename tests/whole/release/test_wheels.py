@@ -55,9 +55,10 @@ PYTEST = ("-m", "pytest", "-q", "--import-mode=importlib", "-p", "no:cacheprovid
 PARTS = [part["name"] for part in PROJECT["tool"]["setuptools"]["ext-modules"]]
 
 
-#: Instead of a compiler: sees that what a source includes is there, and links what the checkout has built.
+#: Instead of a compiler: sees that what a source includes is there, links what the checkout built, and notes of what.
 LOOKING = """#!/bin/sh
 case " $* " in *" -shared "*) ;; *) exec {compiler} "$@" -E;; esac
+echo "$*" >> "$0.links"
 while [ "$1" != -o ]; do shift; done
 folder=${{2%/*}}
 cp "{root}/${{folder##*/}}/${{2##*/}}" "$2"
@@ -151,6 +152,19 @@ def test_a_source_distribution_has_every_source_of_its_parts(wheels: dict[str, P
 
 
 @pytest.mark.slow
+def test_parts_that_are_built_at_the_same_time_share_no_object(wheels: dict[str, Path]) -> None:
+    """The ESP32's program is compiled for either revision of the board: with the other's pins it would start, too."""
+    linked = [
+        {Path(wheel.parent, word) for word in line.split() if word.endswith(".o")}
+        for wheel in wheels.values() for noted in wheel.parent.glob("looking-*.links")
+        for line in noted.read_text().splitlines()
+    ]  # fmt: skip
+    assert len(linked) == len(PARTS)
+    assert min(map(len, linked)) > 1
+    assert len(set().union(*linked)) == sum(map(len, linked))
+
+
+@pytest.mark.slow
 def test_a_wheel_is_for_every_python_and_of_a_platform_only_where_parts_are_in_c(wheels: dict[str, Path]) -> None:
     tags = {name: wheel.stem.split("-", 2)[2] for name, wheel in wheels.items()}
     assert tags["simbase"] == tags["p2os"] == "py3-none-any"
@@ -165,6 +179,10 @@ def test_a_data_file_that_is_left_out_of_a_wheel_is_named(tmp_path: Path) -> Non
     table.write_text(table.read_text(encoding="utf-8").replace(', "*.lua"', ""), encoding="utf-8")
     wheel = built(build(sources, "wheel", tmp_path), tmp_path)
     assert left_out("p2os", wheel) == ["p2os/capture/p2os.lua"]
+
+
+#: Tests of the emulator that take little: of images, of code that is not run, of variables.
+OF_THE_EMULATOR = ("alterations", "image", "static_code", "variables")
 
 
 def shortest_tests(place: Path, *names: str) -> Path:
@@ -209,7 +227,7 @@ def test_the_emulators_wheel_runs_a_program_where_nothing_else_is(
     place = shortest_tests(tmp_path, "tests/bluepill_sim", "robot_bench/firmware")
     for words in (
         ["-m", "bluepill_sim", "run", elf, "--for", "10ms"],
-        [*PYTEST, "tests/bluepill_sim/program"],
+        [*PYTEST, *(f"tests/bluepill_sim/program/test_{name}.py" for name in OF_THE_EMULATOR)],
     ):
         done = subprocess.run(
             [program, *words], cwd=place, env=clean_environment(),
