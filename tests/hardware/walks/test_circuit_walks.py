@@ -168,7 +168,9 @@ def slips(draw: random.Random) -> Iterator[str]:
         smaller = dataclasses.replace(changed, parts=near)
         parts = tuple(one for one in design.components if one.ref in near)
         circuit = dataclasses.replace(design, components=parts)
-        yield said([lands.faults(smaller, circuit), printed.faults(smaller, circuit)])
+        slip = mistakes.Mistake(kind="", name=name, touches=frozenset(touches), design=circuit, board=smaller)
+        yield said([slip.lines(), changed.labels == board.labels or slip.is_named()])
+    yield from _lacks(design, board)
     for seed in (1, 2):
         drawn = mistakes.draw(design, board, seed, 32)
         yield said([[one.kind, one.name, sorted(one.touches)] for one in drawn])
@@ -176,6 +178,26 @@ def slips(draw: random.Random) -> Iterator[str]:
     both = {ref: board.parts[ref].lands for ref in ("U1", "J1")}
     yield said([printed.nearest(both, (x, x / 2)) for x in (0.0, 0.2, 5.9, 6.1, 20.0)])
     yield said([printed.header_net(text) for text in ("GND", "RST", "DD3", "E1S2", "M2C1", "CON", "DD", "x")])
+
+
+def _lacks(design: BoardDesign, board: board_file.PrintedBoard) -> Iterator[str]:
+    """Leave out what a part of the board has, piece by piece."""
+    for ref in ("J3", "D3", "C1", "J2", "U3", "TP4", "Q1", "SW1", "U2"):
+        part = board.parts[ref]
+        kept = {one: board.parts[one] for one in ("U1", "J4", "R9")}
+        circuit = dataclasses.replace(
+            design, components=tuple(one for one in design.components if one.ref in {*kept, ref})
+        )
+        for change in (
+            {"footprint": "NONE"}, {"lands": part.lands[:-1]}, {"lands": (*part.lands, part.lands[0])}, {"marks": ()},
+            {"lands": tuple(dataclasses.replace(one, net="unconnected-(x)") for one in part.lands)},
+            {"lands": tuple(dataclasses.replace(one, at=(one.at[0], one.at[1] + 1.0)) for one in part.lands)},
+            {"marks": (*part.marks, *part.marks)}, {"marks": tuple(one for one in part.marks if one.text)},
+            {"marks": tuple(dataclasses.replace(one, is_filled=False) for one in part.marks)},
+            {"marks": tuple(dataclasses.replace(one, points=tuple((x + 7.0, y) for x, y in one.points)) for one in part.marks)},
+        ):  # fmt: skip
+            wrong = dataclasses.replace(board, parts={**kept, ref: dataclasses.replace(part, **change)}, labels=())  # type: ignore[arg-type]
+            yield f"{ref} {[*change]} {tried(lands.faults, wrong, circuit)} {tried(printed.faults, wrong, circuit)}"
 
 
 def routes(draw: random.Random) -> Iterator[str]:

@@ -36,6 +36,7 @@ from hardware.pcb.outputs import (
     project,
     read_places,
     sexp,
+    steps,
 )
 from hardware.pcb.outputs.symbols import SYMBOLS
 from hardware.pcb.spice import decks, run
@@ -65,6 +66,20 @@ def footprints(draw: random.Random) -> Iterator[str]:
         yield said([board.pad_node(pad, 90.0 * (pad.drill_mm > 0), (3, "GND"), ("x",), copper=pad.drill_mm > 0)])
     yield said([board.text_effects(size, side, is_hidden=hidden, is_bold=hidden) for size in (0.8, 1.0, 1.2, 2.0)
                 for side in ("left", "center") for hidden in (False, True)])  # fmt: skip
+
+
+def sources(draw: random.Random) -> Iterator[str]:
+    """Show every file that is made of one variant."""
+    circuit = build("lm317")
+    yield from generated_files.variant_sources(circuit).values()
+    yield said([board._board((1.23456789, 2.3456789)), generated_files.library_text()])
+    pads = routing.placed_pads(circuit)
+    for shift in (0.0, 0.001):
+        for one in steps.STEPS:
+            noted = [at for pad, _ in one.notes if (at := steps._pad_at(circuit, pad, pads)) is not None]
+            if noted:
+                with patch.object(rules, "BOARD_WIDTH_MM", 2 * (noted[0][0] + shift)):
+                    yield said([*steps._notes(circuit, one, pads)])
 
 
 def readings(draw: random.Random) -> Iterator[str]:
@@ -334,6 +349,8 @@ def _files(draw: random.Random) -> Iterator[str]:
     slab, tower = picture._box(0, 40, 0, 30, -5, 0), picture._box(10, 20, 5, 15, 0, 12)
     yield said([slab, [picture._light(face) for face in (*slab, *tower)]])
     few = [*((one, (1.0, 0.5, 0.0)) for one in slab), *((one, (0.0, 0.5, 1.0)) for one in tower)]
+    flat, away = ((0.0, 0.0, 0.0),) * 3, tuple((x, 900.0, 0.0) for x in (0.0, 5.0, 9.0))
+    few += [(flat, (1.0, 1.0, 1.0)), (away, (1.0, 1.0, 1.0))]
     for turn, tilt in ((28.0, 50.0), (205.0, 40.0)):
         image = picture._seen(few, math.radians(turn), math.radians(tilt))
         yield said([float(image[row, column].sum()) for row in range(45, 190, 6) for column in range(140, 350, 9)])
@@ -366,5 +383,5 @@ class _Shape:
         return f"edges along {axis} of {self}"
 
 
-TRACES: dict[str, Trace] = {each.__name__: each for each in (footprints, readings, calls, cases)}
+TRACES: dict[str, Trace] = {each.__name__: each for each in (footprints, sources, readings, calls, cases)}
 test_what_was_approved_is_shown = judge_of(__file__, TRACES)
