@@ -162,6 +162,7 @@ def classes(draw: random.Random) -> Iterator[str]:
             yield said(("exits", error.code, "p2os_part_exits" in sys.modules))
         changed = own_code("sub/y.py:A", folder)
         (folder / "sub" / "more.py").write_text("")
+        (folder / "sub" / "zzz.py").write_text("")
         yield tried(find_class, changed, what="part", group="simbase.none", known=()).replace(made, "…")
         for name in ("a.py:B", "a.py", "a:b.py:C", ":", "", "tcp:1"):
             yield said((is_in_file(name), located(name, Path("/nowhere")), own_code(name, Path("/nowhere"))))

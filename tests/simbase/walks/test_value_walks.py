@@ -214,6 +214,16 @@ class Fixed:
     number: int
 
 
+@dataclass
+class Chosen(Stateful):
+    """A dataclass that says which of its fields are state."""
+
+    STATE = ("number",)
+
+    number: int = 1
+    other: int = 2
+
+
 class Many(Stateful):
     """A part that holds one value, of whatever sort."""
 
@@ -276,7 +286,7 @@ def kinds(draw: random.Random) -> Iterator[str]:
             )
         yield tried(lambda change=change, part=part: change(part.held) and None)
         yield said([part.held is before, _shown(part.held), _shown(saved["held"])])
-    yield said([state_names(each) for each in (Many, Derived, Record, Outer)])
+    yield said([state_names(each) for each in (Many, Derived, Record, Outer, Chosen)])
     yield tried(Derived(1).restore, Many(1).snapshot())
     yield said(
         [

@@ -17,6 +17,7 @@ from p2os.pioneer.controller.dead_reckoning import DeadReckoning, raw_angle
 from p2os.pioneer.controller.faults import FAULTS, Faults, read_fault
 from p2os.pioneer.controller.flash import DEFAULTS, RANGES, FlashParameters, load_flash
 from p2os.pioneer.controller.live_inputs import INPUTS
+from p2os.pioneer.controller.motion import Motion, MotionLimits
 from p2os.pioneer.controller.settings import LONGEST_SIP_PERIOD_MS, SonarPerSip
 from p2os.pioneer.devices.laser import LaserModel
 from p2os.pioneer.random_source import RandomSource
@@ -284,6 +285,57 @@ def tables(draw: random.Random) -> Iterator[str]:  # noqa: C901, PLR0912 - a tab
         yield said((vars(reckoning), reckoning.heading_rad, reckoning.zero_rad, reckoning.raw_position(485_000)))
 
 
-TRACES: dict[str, Trace] = {each.__name__: each for each in (plain, erring, simulated, crowded, bumped, kinds, tables)}
+def ramps(draw: random.Random) -> Iterator[str]:  # noqa: C901, PLR0912 - a table of acts
+    """Yield set-points step by step, of speeds, wheels and goals, with what changes them on the way."""
+    for model, dt_ns in (("p2dx", 5 * NS_PER_MS), ("p3at-sh", NS_PER_MS // 2), ("amigo", 20 * NS_PER_MS)):
+        parameters = load_parameters(model)
+        motion = Motion(MotionLimits.of(parameters), track_mm=parameters.track_mm, dt_ns=dt_ns)
+        travel = heading = 0
+        for number in range(160):
+            value, other = draw.choice((0, 1, 100, -250, 400, 9999)), draw.choice((0, -1, 30, -90, 200, 9999))
+            match draw.randrange(18):
+                case 0 | 1:
+                    motion.set_velocity(value)
+                case 2 | 3:
+                    motion.set_rotation(other)
+                case 4:
+                    motion.set_wheels(value, other)
+                case 5:
+                    motion.set_wheels_as_turn(value, other)
+                case 6:
+                    motion.move_to(travel + draw.choice((0, 1_999_999, 2_000_000, -2_000_001, 40_000_000, -90_000_000)))
+                case 7:
+                    motion.turn_to(
+                        heading + draw.choice((0, 499_999, 500_001, -500_000, 40_000_000, 180_000_000, -200_000_000))
+                    )
+                case 8:
+                    draw.choice((motion.stop, motion.stop, motion.stop_now, motion.ramp_from_zero))()
+                case 9:
+                    motion.power(on=draw.random() < 0.5)
+                case 10:
+                    draw.choice((motion.hold, motion.release))()
+                case 11:
+                    changes = (motion.limits.with_max_velocity, motion.limits.with_max_rotation,
+                               motion.limits.with_acceleration, motion.limits.with_rotational_acceleration)  # fmt: skip
+                    motion.limits = draw.choice(changes)(draw.choice((300, -200, 0, 50, 9999)) if number < 120 else 100)
+                case 12:
+                    motion.restore(motion.snapshot())
+                case 13 if not motion.has_goal:
+                    yield said(motion.ramp(draw.choice((0, 1, 7))))
+            if number % 12 == 0:
+                motion.power(on=True)
+                motion.release()
+            seen: list[object] = []
+            for _ in range(draw.choice((1, 2, 9))):
+                left, right = motion.step(travel, heading)
+                travel += round((left + right) / 2 * dt_ns)
+                heading += round((right - left) / parameters.track_mm * 180 / math.pi * dt_ns)
+                seen.append(said((motion.wheels_mps, motion._first, motion._second, motion.is_steady)))
+            yield said((seen, motion.mode, motion.setpoints, motion.has_goal, motion.heading_goal_udeg, motion.limits))
+
+
+TRACES: dict[str, Trace] = {
+    each.__name__: each for each in (plain, erring, simulated, crowded, bumped, kinds, tables, ramps)
+}
 TRACES["figures"] = figures_of("p2os.pioneer.controller")
 test_what_was_approved_is_shown = judge_of(__file__, TRACES)
