@@ -4,15 +4,11 @@
 
 import contextlib
 import dataclasses
-import importlib
-import inspect
 import io
 import os
-import pkgutil
 import random
 import re
-from collections.abc import Callable, Iterator, Mapping
-from collections.abc import Set as AbstractSet
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from unittest.mock import patch
 
@@ -28,40 +24,10 @@ from hardware.pcb.layout.routing import Track, load_routes
 from hardware.pcb.outputs import generated_files
 from hardware.pcb.proof import board_file, expected, lands, mistakes, mutants, printed
 from hardware.pcb.spice import deck, decks, netlist, page, run
-from tests.tools.suite.approved import Trace, _assigned, judge_of, rounded, said, tried
+from tests.tools.suite.approved import Trace, declared_in, judge_of, rounded, said, tried
 
 PACKAGES = ("hardware.case", "hardware.pcb", *(f"hardware.pcb.{name}" for name in
             ("checks", "circuit", "layout", "outputs", "proof", "spice")))  # fmt: skip
-
-
-def figures(draw: random.Random) -> Iterator[str]:
-    """Show every table and figure that a module names in capitals."""
-    for package in PACKAGES:
-        root = importlib.import_module(package)
-        for found in sorted(pkgutil.iter_modules(root.__path__), key=lambda one: one.name):
-            module = importlib.import_module(f"{package}.{found.name}")
-            for name in _assigned(inspect.getsource(module)):
-                if _is_table(value := getattr(module, name, None)):
-                    yield f"{module.__name__} {name} {said(_plain(value))}"
-
-
-def _is_table(value: object) -> bool:
-    if isinstance(value, tuple | list | AbstractSet):
-        return all(map(_is_table, value))
-    if isinstance(value, Mapping):
-        return all(map(_is_table, value.values()))
-    if isinstance(value, str):
-        return not value.startswith("/")  # a place on this machine
-    return isinstance(value, int | float) or (dataclasses.is_dataclass(value) and not isinstance(value, type))
-
-
-def _plain(value: object) -> object:
-    """Return a set as its members in order, wherever it stands."""
-    if isinstance(value, AbstractSet):
-        return sorted(map(said, value))
-    if isinstance(value, Mapping):
-        return {key: _plain(each) for key, each in value.items()}
-    return [*map(_plain, value)] if isinstance(value, tuple | list) else value
 
 
 def circuits(draw: random.Random) -> Iterator[str]:
@@ -258,7 +224,6 @@ def commands(draw: random.Random) -> Iterator[str]:
     yield results.table(some)
 
 
-TRACES: dict[str, Trace] = {
-    each.__name__: each for each in (figures, circuits, orders, slips, routes, simulations, commands)
-}
+TRACES: dict[str, Trace] = {each.__name__: each for each in (circuits, orders, slips, routes, simulations, commands)}
+TRACES["declared"] = declared_in(*PACKAGES)
 test_what_was_approved_is_shown = judge_of(__file__, TRACES)

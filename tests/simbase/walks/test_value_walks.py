@@ -32,7 +32,7 @@ from simbase.units import (
     ranges_text,
 )
 from simbase.wire import are_fighting, level_of
-from tests.tools.suite.approved import Trace, figures_of, judge_of, refusal, said, tried
+from tests.tools.suite.approved import Trace, declared_in, judge_of, refusal, said, tried
 
 QUANTITIES = (LENGTH, ANGLE, SPEED, TURN_RATE, TIME, BAUD, FACTOR, PERCENT, COUNT, PORT)
 NUMBERS = (
@@ -314,7 +314,5 @@ def _shown(held: object) -> str:
 
 
 TRACES: dict[str, Trace] = {each.__name__: each for each in (quantities, words, first_bytes, states, kinds)}
-TRACES |= {
-    f"figures of {package}": figures_of(package) for package in ("simbase", "simbase.command_line", "simbase.trust")
-}
+TRACES["declared"] = declared_in("simbase", "simbase.command_line", "simbase.trust")
 test_what_was_approved_is_shown = judge_of(__file__, TRACES)

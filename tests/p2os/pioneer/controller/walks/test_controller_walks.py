@@ -29,7 +29,7 @@ from p2os.protocol.commands import CommandNumber as C
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import load_parameters
 from simbase.timing import NS_PER_MS
-from tests.tools.suite.approved import Trace, figures_of, judge_of, said, tried
+from tests.tools.suite.approved import Trace, declared_in, figures_of, judge_of, said, tried
 
 LASER = LaserModel(start_deg=-20, end_deg=20, step_cdeg=200, range_m=8.0)
 #: What moves the robot, and is said more often than the rest.
@@ -201,6 +201,11 @@ def kinds(draw: random.Random) -> Iterator[str]:
                 sent = b"".join(frame for frame in pioneer.take_output())
                 yield said((number, argument, events, sent.hex(), pioneer.state, pioneer.stats))
                 events.clear()
+        for size in (1, 2, 39, 40, 41, 42, 43, 60):
+            pioneer.receive(Command(C.SAY, bytes(range(1, size + 1))).to_frame().to_bytes(), now)
+            pioneer.advance_to(now)
+            yield said((size, events))
+            events.clear()
 
 
 def tables(draw: random.Random) -> Iterator[str]:  # noqa: C901, PLR0912 - a table after the other
@@ -338,4 +343,5 @@ TRACES: dict[str, Trace] = {
     each.__name__: each for each in (plain, erring, simulated, crowded, bumped, kinds, tables, ramps)
 }
 TRACES["figures"] = figures_of("p2os.pioneer.controller")
+TRACES["declared"] = declared_in("p2os.pioneer.controller")
 test_what_was_approved_is_shown = judge_of(__file__, TRACES)
