@@ -140,6 +140,7 @@ def drivers(draw: random.Random) -> Iterator[str]:
             took = pacer.take(now) if due <= now else None
             yield said([now, due, took, pacer.snapshot()])
         watch = SpeedPlausibility(timeout_ns=1_500_000_000, tolerance_mm_s=40, progress_mm_s=5)
+        yield said([watch.snapshot(), watch.ends_at, CommandPacer(spacing_ns=25, refresh_ns=200).snapshot()])
         watch.begin(now)
         for _ in range(14):
             now += 100

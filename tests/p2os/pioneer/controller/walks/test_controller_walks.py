@@ -12,7 +12,7 @@ from typing import Any
 from p2os.pioneer.body.contract import free_wheels
 from p2os.pioneer.body.factory import make_body
 from p2os.pioneer.controller import ControllerSettings, Pioneer
-from p2os.pioneer.controller.bumper_watch import _middle, _touched
+from p2os.pioneer.controller.bumper_watch import _middle, _touched, stalls
 from p2os.pioneer.controller.dead_reckoning import DeadReckoning, raw_angle
 from p2os.pioneer.controller.faults import FAULTS, Faults, read_fault
 from p2os.pioneer.controller.flash import DEFAULTS, RANGES, FlashParameters, load_flash
@@ -168,6 +168,8 @@ def bumped(draw: random.Random) -> Iterator[str]:
                     pioneer.advance_to(now_ms * NS_PER_MS)
                     yield said((policy, side, speed, now_ms, pioneer.state, pioneer.next_deadline()))
                 yield b"".join(pioneer.take_output())[-40:].hex()
+                until = pioneer._context.bumper_watch.stalled_until
+                yield said([until, *(stalls(pioneer._context, body.state, until + by) for by in (-1, 0, 1))])
     for number, value in ((C.BATTEST, 110), (C.PULSE, None)):
         for words in ("fault low-battery 10.5", "clear low-battery", "fault low-battery 11"):
             pioneer.receive(Command(number, value).to_frame().to_bytes(), 480 * NS_PER_MS)
