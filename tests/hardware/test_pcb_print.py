@@ -167,6 +167,18 @@ def test_a_table_that_differs_from_kicad_s_library_is_named(tmp_path: Path) -> N
     assert line.startswith("R_0805: ")
 
 
+@pytest.mark.parametrize(("ref", "line"), [("J1", "'+12V-' is about J1"), ("J2", "'+5V-' is about J2"), ("J4", "J4 ")])
+def test_a_connector_that_circuit_or_board_lacks_is_named(ref: str, line: str) -> None:
+    fewer = tuple(part for part in build().components if part.ref != ref)
+    parts = {name: part for name, part in board().parts.items() if name != ref}
+    without = dataclasses.replace(board(), parts=parts)
+    assert any(found.startswith(line) for found in printed.faults(without, build()))
+    if ref != "J4":
+        assert any(
+            found.startswith(line) for found in printed.faults(board(), dataclasses.replace(build(), components=fewer))
+        )
+
+
 def named(variant: str, seed: int, count: int) -> tuple[int, list[str]]:
     drawn = draw(build(variant), board(variant), seed, count)
     return len(drawn), [f"{one.kind}: {one.name}" for one in drawn if not one.is_named()]

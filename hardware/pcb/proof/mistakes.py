@@ -36,11 +36,10 @@ class Mistake:
 
     def is_named(self) -> bool:
         """Tell whether a line names the part, pin, net or text of the slip."""
-        words = {word for line in self.lines() for word in re.findall(r"[\w+.-]+", line)}
+        lines = self.lines()
+        words = {word for line in lines for word in re.findall(r"[\w+.-]+", line)}
         words |= {word.split(".")[0] for word in words}
-        return bool(words & self.touches) or any(
-            text in line for text in self.touches for line in self.lines() if "'" in line
-        )
+        return bool(words & self.touches) or any(text in line for text in self.touches for line in lines if "'" in line)
 
 
 def draw(design: BoardDesign, board: PrintedBoard, seed: int, count: int = 60) -> list[Mistake]:

@@ -197,7 +197,7 @@ def _labels(board: PrintedBoard, design: BoardDesign) -> Iterator[str]:
     wanted_texts = [text for text, (ref, _) in LABELS.items() if ref in parts] + list(POLES)
     yield from (f"{text!r} is printed {seen.count(text)} times" for text in wanted_texts if seen.count(text) != 1)
     named = sum(header_net(text) is not None for text in seen)
-    if named != len(board.parts["J4"].lands):
+    if "J4" in board.parts and named != len(board.parts["J4"].lands):
         yield f"J4 has {named} names for {len(board.parts['J4'].lands)} pins"
 
 
@@ -216,6 +216,9 @@ def _poles(
     mark: PrintedMark, ref: str, board: PrintedBoard, lands: Mapping[str, tuple[PlacedLand, ...]], design: BoardDesign
 ) -> Iterator[str]:
     """The sign at either end of a text belongs to the pad of its part that stands nearest to it."""
+    if ref not in lands or all(part.ref != ref for part in design.components):
+        yield f"{mark.text!r} is about {ref}, which is not in circuit and board"
+        return
     half = (len(mark.text) - 1) / 2 * LETTER * mark.width_mm
     (x, y), pins = mark.at, dict(design.component(ref).pins)
     nearby = min((_beside(board.parts[name], mark.at), name) for name in lands)

@@ -35,7 +35,7 @@ from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import StandardSip
 from p2os.robots.parameters import load_parameters
 from tests.adapter_sim.conftest import PARAMETERS, PINOUT, PINOUT_TEXT, FakePins, FakeRobot, four_bits
-from tests.tools.suite.approved import Trace, judge_of, said, tried
+from tests.tools.suite.approved import Trace, declared_in, judge_of, said, tried
 
 MS = 1_000_000
 
@@ -140,6 +140,7 @@ def drivers(draw: random.Random) -> Iterator[str]:
             took = pacer.take(now) if due <= now else None
             yield said([now, due, took, pacer.snapshot()])
         watch = SpeedPlausibility(timeout_ns=1_500_000_000, tolerance_mm_s=40, progress_mm_s=5)
+        yield said([watch.snapshot(), watch.ends_at, CommandPacer(spacing_ns=25, refresh_ns=200).snapshot()])
         watch.begin(now)
         for _ in range(14):
             now += 100
@@ -616,5 +617,6 @@ TRACES: dict[str, Trace] = {
     "settings": settings,
     "stops": stops,
     "sessions": sessions,
+    "declared": declared_in("adapter_sim"),
 }
 test_a_walk_shows_what_was_approved = judge_of(__file__, TRACES)

@@ -15,11 +15,12 @@ import signal
 import socket
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+import threading
+from collections.abc import Callable, Iterator, Mapping
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Protocol
+from typing import ClassVar, Protocol
 from unittest.mock import patch
 
 import typer
@@ -28,9 +29,10 @@ from simbase import entry_points, files, installation
 from simbase.c_library import guarded, loaded
 from simbase.command_line import program, refused_connections
 from simbase.command_line.gdb_option import usual_port
+from simbase.command_line.help_pages import Usual, VerbPage, dress
 from simbase.command_line.signals import end_on_signals, end_on_suspension, ignore_signals, postponed, restored_signals
 from simbase.errors import FileError, MissingDependencyError, P2osError, UsageError
-from simbase.interrupts import FATAL, signal_numbers
+from simbase.interrupts import FATAL, exit_on_signals, held_back, signal_numbers
 from simbase.lazy import DeprecatedName, lazily
 from simbase.listening import GuardedConnection, GuardedListener, listen_tcp
 from simbase.terminal import ReadableBytes, ReadableStream, drawn, readable_stream
@@ -40,6 +42,7 @@ from simbase.trust.decision import Trust
 from simbase.trust.sources import _SourcesOf
 from simbase.user_classes import broken, find_class, make, refuse_lacking, source_of, unforeseen
 from simbase.user_classes import said as said_of
+from tests.tools.suite.acted import Acted, taken
 from tests.tools.suite.approved import Trace, judge_of, said, tried
 
 
@@ -159,6 +162,7 @@ def classes(draw: random.Random) -> Iterator[str]:
             yield said(("exits", error.code, "p2os_part_exits" in sys.modules))
         changed = own_code("sub/y.py:A", folder)
         (folder / "sub" / "more.py").write_text("")
+        (folder / "sub" / "zzz.py").write_text("")
         yield tried(find_class, changed, what="part", group="simbase.none", known=()).replace(made, "…")
         for name in ("a.py:B", "a.py", "a:b.py:C", ":", "", "tcp:1"):
             yield said((is_in_file(name), located(name, Path("/nowhere")), own_code(name, Path("/nowhere"))))
@@ -348,16 +352,116 @@ def _raised(action: Callable[[], object]) -> str:
     return "goes on"
 
 
+def interrupts(draw: random.Random) -> Iterator[str]:
+    """Hold interrupts back until work is done, and exit by signals that nobody handles."""
+    for raised in (None, KeyboardInterrupt("a"), SystemExit(7), ValueError("v")):
+        begun = list[int]()
+
+        def work(raised: BaseException | None = raised, begun: list[int] = begun) -> None:
+            begun.append(len(begun))
+            if raised is not None and len(begun) < 3:
+                raise raised
+
+        try:
+            held_back(work)
+            ended = "done"
+        except BaseException as error:  # noqa: BLE001  # what is raised is shown
+            ended = f"{type(error).__name__} {error}"
+        yield said((begun, ended))
+    with restored_signals():
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        signal.signal(signal.SIGHUP, signal.SIG_IGN)
+        exit_on_signals()
+        yield said([signal.getsignal(signal.SIGHUP) == signal.SIG_IGN])
+        try:
+            signal.raise_signal(signal.SIGTERM)
+        except SystemExit as error:
+            yield said(error.code)
+    with restored_signals():  # not in a thread
+        before = [signal.getsignal(number) for number in signal_numbers(FATAL)]
+        thread = threading.Thread(target=lambda: [each() for each in (exit_on_signals, end_on_signals, ignore_signals)])
+        thread.start()
+        thread.join(5.0)
+        yield said([before == [signal.getsignal(number) for number in signal_numbers(FATAL)]])
+
+
+def pages(draw: random.Random) -> Iterator[str]:
+    """Show the pages of a program with verbs in groups, what its words become, and how its process is tuned and ends."""
+    heard = list[str]()
+
+    class Filling(VerbPage):
+        usual: ClassVar[Mapping[str, Usual]] = {"--gdb": usual_port}
+
+    some = typer.Argument(None, metavar="[ONE TWO]", help="More.")
+
+    def far(
+        first: str,
+        second: list[str] = some,
+        gdb: int = typer.Option(0, "--gdb", help="A port."),
+        hidden: bool = typer.Option(False, hidden=True),
+    ) -> None:
+        """Drive far. And on.
+
+        {program} far x      goes to x and says so, in a line that is longer than a page is wide, of course
+        """
+        heard.append(said((first, [*(second or ())], gdb, hidden)))
+
+    def near(place: str = typer.Argument("here", help="Where."), other: str = typer.Argument(...)) -> None:
+        """Stay near."""
+        heard.append(said((place, other)))
+
+    app, below = (
+        typer.Typer(help=words, epilog="Ends {program}.", rich_markup_mode=None, add_completion=False)
+        for words in ("Of {program}: much.", "Below.")
+    )
+    app.command(cls=Filling, rich_help_panel="Driving", epilog="See {program}.")(far)
+    app.command()(near)
+    app.command(hidden=True)(lambda: None)
+    below.command("one")(lambda: heard.append("one"))
+    below.command("two", rich_help_panel="Driving")(lambda: heard.append("two"))
+    app.add_typer(below, name="below")
+    dress(app)
+    for words in (["--help"], [], ["far", "--help"], ["near", "--help"], ["below"], ["below", "one", "--help"], ["far", "x", "--gdb"], ["far", "x", "--gdb", "7"],
+                  ["far", "--gdb", "x"], ["far", "x", "y", "z"], ["near", "a"], ["near", "a", "b"], ["below", "two"], ["far", "x", "--no"]):  # fmt: skip
+        with (
+            contextlib.redirect_stdout(io.StringIO()) as out,
+            contextlib.redirect_stderr(io.StringIO()) as err,
+            patch.dict(os.environ, COLUMNS="80"),
+        ):
+            code = program.run("prog", lambda _: app, words)
+        yield said((words, code, heard, out.getvalue(), err.getvalue()))
+        heard.clear()
+    for is_enabled in (True, False):
+        with patch.object(program, "gc", Acted(heard, "gc", isenabled=[is_enabled])):
+            program.run("prog", lambda _: app, ["below", "one"])
+        yield taken(heard)
+    names = ("end_on_signals", "ignore_signals")
+    for words in (["a"], ["--trace", "b"], ["b", "--trace"]):
+        calls = Acted(heard, "", run=[3])
+        with contextlib.ExitStack() as stack:
+            for name in names:
+                stack.enter_context(patch.object(program, name, getattr(calls, name)))
+            try:
+                program.main(calls.run, words)
+            except SystemExit as error:
+                yield said((taken(heard), error.code))
+    with contextlib.redirect_stderr(io.StringIO()) as err:
+        code = program.report("prog", ValueError("v"), trace=True)
+    yield said((code, err.getvalue().splitlines()[:1]))
+
+
 class OddError(Exception):
     """An error of nobody."""
 
 
 def reports(draw: random.Random) -> Iterator[str]:
     """Report what may go wrong in a line, and run a small command line."""
+    with patch.object(installation, "_pip_install", lambda: "pip install"):
+        missing = MissingDependencyError("m", extra="e")
     following = ValueError("a ZIP")
     following.__context__ = MemoryError()
     for error in (UsageError("u\n v", hint="h\n i"), P2osError("p"), FileError("f"), OddError("odd"), ValueError("v"), MemoryError(), MemoryError("more"), following, OSError(errno.ENOSPC, "No Space"),
-                  OSError(errno.EIO, "Input/output", "file"), OSError(errno.EMFILE, "Too many"), OSError(errno.ENFILE, "Too many", "x"), OSError(errno.ENOENT, "None", "x"), MissingDependencyError("m", extra="e")):  # fmt: skip
+                  OSError(errno.EIO, "Input/output", "file"), OSError(errno.EMFILE, "Too many"), OSError(errno.ENFILE, "Too many", "x"), OSError(errno.ENOENT, "None", "x"), missing):  # fmt: skip
         with contextlib.redirect_stderr(io.StringIO()) as err:
             code = program.report("prog", error)
         yield said((code, err.getvalue().partition("pip")[0]))
@@ -565,6 +669,7 @@ def tried_missing(action: Callable[[], object]) -> str:
 
 
 TRACES: dict[str, Trace] = {
-    each.__name__: each for each in (texts, classes, connections, signals, reports, streams, installations)
+    each.__name__: each
+    for each in (texts, classes, connections, signals, interrupts, reports, pages, streams, installations)
 }
 test_what_was_approved_is_shown = judge_of(__file__, TRACES)

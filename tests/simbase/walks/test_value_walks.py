@@ -1,15 +1,21 @@
 """Quantities as people type them, names and words in messages, first bytes and saved states, as approved."""
 
+# ruff: noqa: E501  # rows of tables stand as they are
+
+import ctypes
 import random
 from array import array
-from collections import OrderedDict, deque
-from collections.abc import Iterator
+from collections import Counter, OrderedDict, defaultdict, deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
+from simbase import timing
 from simbase.command_line.help_pages import first_sentence, folded
 from simbase.errors import FileError, UsageError, nearest, one_line, shown, shown_name
 from simbase.files import VersionedFormat, hint_of, reason_of, with_plain_ends
 from simbase.listening import FirstBytes
-from simbase.state import PartState, Rows, Stateful
+from simbase.state import PartState, Rows, Stateful, state_names
 from simbase.terminal import readable
 from simbase.units import (
     ANGLE,
@@ -25,7 +31,8 @@ from simbase.units import (
     range_words,
     ranges_text,
 )
-from tests.tools.suite.approved import Trace, judge_of, refusal, said, tried
+from simbase.wire import are_fighting, level_of
+from tests.tools.suite.approved import Trace, declared_in, judge_of, refusal, said, tried
 
 QUANTITIES = (LENGTH, ANGLE, SPEED, TURN_RATE, TIME, BAUD, FACTOR, PERCENT, COUNT, PORT)
 NUMBERS = (
@@ -185,5 +192,127 @@ def states(draw: random.Random) -> Iterator[str]:
     yield said((tried(rows.restore, kept[:1]), tried(rows.restore, ()), tried(Rows([Inner()]).snapshot)))
 
 
-TRACES: dict[str, Trace] = {each.__name__: each for each in (quantities, words, first_bytes, states)}
+class Pair(NamedTuple):
+    """A named tuple of state."""
+
+    one: object
+    other: object
+
+
+@dataclass
+class Record:
+    """A dataclass that is filled anew."""
+
+    number: int
+    rows: list[int]
+
+
+@dataclass(frozen=True)
+class Fixed:
+    """A dataclass that is kept as it is."""
+
+    number: int
+
+
+@dataclass
+class Chosen(Stateful):
+    """A dataclass that says which of its fields are state."""
+
+    STATE = ("number",)
+
+    number: int = 1
+    other: int = 2
+
+
+class Many(Stateful):
+    """A part that holds one value, of whatever sort."""
+
+    STATE = ("held", "more")
+
+    def __init__(self, held: object) -> None:
+        self.held, self.more, self.restored = held, 0, 0
+
+    def _restored(self) -> None:
+        self.restored += 1
+
+
+class Derived(Many):
+    """A part with state of its own beside that of its base."""
+
+    STATE = ("less", "more")
+    less = 7
+
+
+def _words(count: int) -> object:
+    return (ctypes.c_uint16 * 3)(count, count + 1, count + 2)
+
+
+#: What a part may hold, made anew, and how it changes.
+KINDS: tuple[tuple[Callable[[], Any], Callable[[Any], object]], ...] = (
+    (lambda: Counter("aab"), lambda held: held.update("bc")), (lambda: defaultdict(list, a=[1]), lambda held: held["b"].append(2)),
+    (lambda: Pair([1], 2), lambda held: held.one.append(3)), (lambda: Record(1, [2]), lambda held: held.rows.append(4)),
+    (lambda: Fixed(3), id), (lambda: _words(1), lambda held: held.__setitem__(1, 9)), (lambda: random.Random(5), lambda held: held.random()),
+    (lambda: deque([[1], [2]], maxlen=2), lambda held: held.append([3])), (lambda: {"a": Inner(), "b": Inner()}, lambda held: held.pop("a")),
+    (lambda: {"a": Inner()}, lambda held: held.update(b=Inner())), (lambda: [Inner()], lambda held: held.append(Inner())),
+    (lambda: (Inner(), [1]), lambda held: held[1].append(2)), (lambda: {1, 2}, lambda held: held.add(3)), (lambda: bytearray(b"ab"), lambda held: held.extend(b"c")),
+    (lambda: array("H", [1, 2]), lambda held: held.append(3)), (lambda: {"a": {"b": [1]}}, lambda held: held["a"]["b"].append(2)),
+    (lambda: [1, 2, 3], lambda held: held.clear()), (lambda: ([1], (2, [3])), lambda held: held[1][1].append(4)), (lambda: print, id), (lambda: [print], id),
+    (lambda: {"a": 1, "b": 2}, lambda held: held.update(a=held.pop("a"))), (lambda: b"ab", id), (lambda: {"x": Record(1, [2])}, lambda held: held["x"].rows.clear()),
+)  # fmt: skip
+
+
+def kinds(draw: random.Random) -> Iterator[str]:
+    """Save values of every kind, change them, restore them twice and elsewhere."""
+    for make, change in KINDS:
+        part, other = Many(make()), Many(None)
+        try:
+            saved = part.snapshot()
+        except TypeError as error:
+            yield refusal(error)
+            continue
+        yield said([[*saved], *map(_shown, saved.values())])
+        before = part.held
+        change(part.held)
+        part.more = 1
+        yield said([_shown(part.held), _shown(saved["held"])])
+        for restored in (part, part, other):
+            yield tried(
+                lambda restored=restored, saved=saved: [
+                    restored.restore(saved),
+                    _shown(restored.held),
+                    restored.more,
+                    restored.restored,
+                ]
+            )
+        yield tried(lambda change=change, part=part: change(part.held) and None)
+        yield said([part.held is before, _shown(part.held), _shown(saved["held"])])
+    yield said([state_names(each) for each in (Many, Derived, Record, Outer, Chosen)])
+    yield tried(Derived(1).restore, Many(1).snapshot())
+    yield said(
+        [
+            [level_of(hard, pulls) for pulls in ((), (True,), (False, True))]
+            for hard in ((), (True,), (False,), (True, False))
+        ]
+    )
+    yield said([are_fighting(hard) for hard in ((), (True,), (True, False), (None, True), (True, True))])
+    yield said([timing.nanos(span) for span in (0.0, 1e-9, 1.5e-9, 2.5e-9, 1.0, -0.25)])
+    yield said([timing.Reached(5), *timing.Reason])
+
+
+def _shown(held: object) -> str:
+    """Return what is held as text, whatever it is."""
+    kind = type(held).__name__
+    if isinstance(held, Inner | random.Random):
+        return f"{kind} {said(held.numbers if isinstance(held, Inner) else held.getstate()[1][-1])}"
+    if isinstance(held, ctypes.Array):
+        return f"words {said([*held])}"
+    if isinstance(held, dict):
+        return f"{kind}{said({key: _shown(each) for key, each in held.items()})}"
+    if isinstance(held, list | tuple | deque):  # the longest is a generator's state
+        return f"{kind}{said([*map(_shown, held)][:9])}"
+    return said(sorted(held)) if isinstance(held, set) else said(held)
+
+
+TRACES: dict[str, Trace] = {each.__name__: each for each in (quantities, words, first_bytes, states, kinds)}
+TRACES["declared"] = declared_in("simbase", "simbase.command_line", "simbase.trust")
 test_what_was_approved_is_shown = judge_of(__file__, TRACES)

@@ -12,11 +12,12 @@ from typing import Any
 from p2os.pioneer.body.contract import free_wheels
 from p2os.pioneer.body.factory import make_body
 from p2os.pioneer.controller import ControllerSettings, Pioneer
-from p2os.pioneer.controller.bumper_watch import _middle, _touched
+from p2os.pioneer.controller.bumper_watch import _middle, _touched, stalls
 from p2os.pioneer.controller.dead_reckoning import DeadReckoning, raw_angle
 from p2os.pioneer.controller.faults import FAULTS, Faults, read_fault
 from p2os.pioneer.controller.flash import DEFAULTS, RANGES, FlashParameters, load_flash
 from p2os.pioneer.controller.live_inputs import INPUTS
+from p2os.pioneer.controller.motion import Motion, MotionLimits
 from p2os.pioneer.controller.settings import LONGEST_SIP_PERIOD_MS, SonarPerSip
 from p2os.pioneer.devices.laser import LaserModel
 from p2os.pioneer.random_source import RandomSource
@@ -28,7 +29,7 @@ from p2os.protocol.commands import CommandNumber as C
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import load_parameters
 from simbase.timing import NS_PER_MS
-from tests.tools.suite.approved import Trace, figures_of, judge_of, said, tried
+from tests.tools.suite.approved import Trace, declared_in, figures_of, judge_of, said, tried
 
 LASER = LaserModel(start_deg=-20, end_deg=20, step_cdeg=200, range_m=8.0)
 #: What moves the robot, and is said more often than the rest.
@@ -167,6 +168,8 @@ def bumped(draw: random.Random) -> Iterator[str]:
                     pioneer.advance_to(now_ms * NS_PER_MS)
                     yield said((policy, side, speed, now_ms, pioneer.state, pioneer.next_deadline()))
                 yield b"".join(pioneer.take_output())[-40:].hex()
+                until = pioneer._context.bumper_watch.stalled_until
+                yield said([until, *(stalls(pioneer._context, body.state, until + by) for by in (-1, 0, 1))])
     for number, value in ((C.BATTEST, 110), (C.PULSE, None)):
         for words in ("fault low-battery 10.5", "clear low-battery", "fault low-battery 11"):
             pioneer.receive(Command(number, value).to_frame().to_bytes(), 480 * NS_PER_MS)
@@ -200,6 +203,11 @@ def kinds(draw: random.Random) -> Iterator[str]:
                 sent = b"".join(frame for frame in pioneer.take_output())
                 yield said((number, argument, events, sent.hex(), pioneer.state, pioneer.stats))
                 events.clear()
+        for size in (1, 2, 39, 40, 41, 42, 43, 60):
+            pioneer.receive(Command(C.SAY, bytes(range(1, size + 1))).to_frame().to_bytes(), now)
+            pioneer.advance_to(now)
+            yield said((size, events))
+            events.clear()
 
 
 def tables(draw: random.Random) -> Iterator[str]:  # noqa: C901, PLR0912 - a table after the other
@@ -284,6 +292,58 @@ def tables(draw: random.Random) -> Iterator[str]:  # noqa: C901, PLR0912 - a tab
         yield said((vars(reckoning), reckoning.heading_rad, reckoning.zero_rad, reckoning.raw_position(485_000)))
 
 
-TRACES: dict[str, Trace] = {each.__name__: each for each in (plain, erring, simulated, crowded, bumped, kinds, tables)}
+def ramps(draw: random.Random) -> Iterator[str]:  # noqa: C901, PLR0912 - a table of acts
+    """Yield set-points step by step, of speeds, wheels and goals, with what changes them on the way."""
+    for model, dt_ns in (("p2dx", 5 * NS_PER_MS), ("p3at-sh", NS_PER_MS // 2), ("amigo", 20 * NS_PER_MS)):
+        parameters = load_parameters(model)
+        motion = Motion(MotionLimits.of(parameters), track_mm=parameters.track_mm, dt_ns=dt_ns)
+        travel = heading = 0
+        for number in range(160):
+            value, other = draw.choice((0, 1, 100, -250, 400, 9999)), draw.choice((0, -1, 30, -90, 200, 9999))
+            match draw.randrange(18):
+                case 0 | 1:
+                    motion.set_velocity(value)
+                case 2 | 3:
+                    motion.set_rotation(other)
+                case 4:
+                    motion.set_wheels(value, other)
+                case 5:
+                    motion.set_wheels_as_turn(value, other)
+                case 6:
+                    motion.move_to(travel + draw.choice((0, 1_999_999, 2_000_000, -2_000_001, 40_000_000, -90_000_000)))
+                case 7:
+                    motion.turn_to(
+                        heading + draw.choice((0, 499_999, 500_001, -500_000, 40_000_000, 180_000_000, -200_000_000))
+                    )
+                case 8:
+                    draw.choice((motion.stop, motion.stop, motion.stop_now, motion.ramp_from_zero))()
+                case 9:
+                    motion.power(on=draw.random() < 0.5)
+                case 10:
+                    draw.choice((motion.hold, motion.release))()
+                case 11:
+                    changes = (motion.limits.with_max_velocity, motion.limits.with_max_rotation,
+                               motion.limits.with_acceleration, motion.limits.with_rotational_acceleration)  # fmt: skip
+                    motion.limits = draw.choice(changes)(draw.choice((300, -200, 0, 50, 9999)) if number < 120 else 100)
+                case 12:
+                    motion.restore(motion.snapshot())
+                case 13 if not motion.has_goal:
+                    yield said(motion.ramp(draw.choice((0, 1, 7))))
+            if number % 12 == 0:
+                motion.power(on=True)
+                motion.release()
+            seen: list[object] = []
+            for _ in range(draw.choice((1, 2, 9))):
+                left, right = motion.step(travel, heading)
+                travel += round((left + right) / 2 * dt_ns)
+                heading += round((right - left) / parameters.track_mm * 180 / math.pi * dt_ns)
+                seen.append(said((motion.wheels_mps, motion._first, motion._second, motion.is_steady)))
+            yield said((seen, motion.mode, motion.setpoints, motion.has_goal, motion.heading_goal_udeg, motion.limits))
+
+
+TRACES: dict[str, Trace] = {
+    each.__name__: each for each in (plain, erring, simulated, crowded, bumped, kinds, tables, ramps)
+}
 TRACES["figures"] = figures_of("p2os.pioneer.controller")
+TRACES["declared"] = declared_in("p2os.pioneer.controller")
 test_what_was_approved_is_shown = judge_of(__file__, TRACES)

@@ -14,9 +14,10 @@ from importlib.util import find_spec
 from pathlib import Path
 from unittest.mock import patch
 
-from p2os.pioneer.world import model, parse_world
+from p2os.pioneer.world import model, parse_world, text_file
 from p2os.pioneer.world.file import IMPORT_KEYS, MARK_KEYS, MESH_KEYS, SHAPES, START_KEYS, in_range
 from p2os.pioneer.world.formats import annotation, aria_map, collection, rectangles, sdf, urdf, xml_tree
+from p2os.pioneer.world.formats.local_file import find_local
 from p2os.pioneer.world.formats.meshes import collada, gltf, mesh_file, polygon
 from p2os.pioneer.world.geometry import Footprint, placed
 from p2os.pioneer.world.makers.walkway import Measures, walkway
@@ -546,6 +547,35 @@ def ramps(draw: random.Random) -> Iterator[str]:
         )
 
 
+def named(draw: random.Random) -> Iterator[str]:
+    """Look for files that a file names: beside it, above it, by each scheme, too large, and none."""
+    with tempfile.TemporaryDirectory() as made:
+        beside = Path(made, "own", "sub", "w.sdf")
+        for name in ("own/sub/a.stl", "own/b.stl", "own/sub/deep/c.stl", "own/model.d/e.stl", "d.stl"):
+            (file := Path(made, name)).parent.mkdir(parents=True, exist_ok=True)
+            file.write_bytes(b"x" * len(name))
+        for scheme in ("", "file://", "package://", "model://", "http://", " "):
+            for rest in (
+                "a.stl",
+                "b.stl",
+                "deep/c.stl",
+                "other/c.stl",
+                "model.d/e.stl",
+                "other/d.stl",
+                "other/",
+                "",
+                ".",
+                "\0",
+            ):
+                yield f"{scheme}{rest} {tried(find_local, scheme + rest, beside)}".replace(made, "…")
+        for scheme in ("", "file://"):
+            yield tried(find_local, f"{scheme}{made}/d.stl", beside).replace(made, "…")
+        for least in (4, 5, 6):
+            with patch.object(text_file, "LARGEST_FILE_BYTES", least):
+                yield tried(text_file.sized, Path(made, "d.stl")).replace(made, "…")
+        yield tried(text_file.sized, Path(made, "none")).replace(made, "…")
+
+
 def limits(draw: random.Random) -> Iterator[str]:
     """Say what the pages promise that is taken, and what is not: none of these is met by a file of a test."""
     for module in (aria_map, collada, collection, gltf, mesh_file, model, polygon, sdf, urdf, xml_tree):
@@ -570,6 +600,7 @@ TRACES: dict[str, Trace] = {
         touches,
         images,
         ramps,
+        named,
         limits,
     )
 }

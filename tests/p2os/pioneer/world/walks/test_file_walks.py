@@ -10,6 +10,7 @@ from pathlib import Path
 
 from p2os.errors import WorldError
 from p2os.pioneer.export import export
+from p2os.pioneer.export.scenes import scene_of
 from p2os.pioneer.world import load_world, parse_world
 from p2os.pioneer.world.formats.meshes.polygon import triangulated
 from p2os.pioneer.world.interchange import transform
@@ -20,7 +21,7 @@ from tests.p2os.pioneer.world import test_importers_maps as maps
 from tests.p2os.pioneer.world import test_importers_meshes as meshes
 from tests.p2os.pioneer.world import test_importers_xml as xml
 from tests.p2os.pioneer.world.walks.things import drawn_world
-from tests.tools.suite.approved import Trace, judge_of, refusal, rounded, said, tried
+from tests.tools.suite.approved import Trace, declared_in, judge_of, refusal, rounded, said, tried
 
 _NUMBER = re.compile(r"(?<![\w#.])-?\d+(?:\.\d+)?(?![\w.])")
 NUMBERS = ("0", "1", "-1", "2", "0.5", "3", "1000", "1e9", "90", "x", "")
@@ -129,6 +130,7 @@ def worlds(draw: random.Random) -> Iterator[str]:
 def exported(draw: random.Random) -> Iterator[str]:
     for number in range(3):
         world, robot = drawn_world(draw), load_parameters(("p2dx", "p3at", "amigo")[number])
+        yield from (said(body) for body in scene_of(world, robot).bodies)
         for ending in ("sdf", "urdf", "xml", "gltf", "glb"):
             for shown in ((world, robot), (None, robot)):
                 made = export(f"a.{ending}", *shown)
@@ -169,4 +171,5 @@ TRACES: dict[str, Trace] = {
     **({"occupancy": walk_of("map.yaml", maps.YAML, 24)} if find_spec("PIL") and find_spec("yaml") else {}),
     **{each.__name__: each for each in (worlds, exported, polygons, transforms)},
 }
+TRACES["declared"] = declared_in("p2os.pioneer.export")
 test_what_was_approved_is_shown = judge_of(__file__, TRACES)
