@@ -33,7 +33,8 @@ from robot_bench.cli.campaigns import campaign as verb
 from robot_bench.scenario.loading import load_scenario
 from simbase.errors import P2osError
 from tests.robot_bench.campaign.test_campaign import Shuffled
-from tests.tools.suite.approved import judge_of, rounded, said, tried
+from tests.robot_bench.declared import declared_of
+from tests.tools.suite.approved import Trace, judge_of, rounded, said, tried
 
 SCENARIO = """
 firmware = "dodge.elf"
@@ -324,5 +325,7 @@ def figures(draw: Random) -> Iterator[str]:
     yield said([page._correlation([(1.0, 1.0), (1.0, 2.0)]), page._last(None)])
 
 
-TRACES = {"campaigns": campaigns, "files": files, "figures": figures}
+TRACES: dict[str, Trace] = {"campaigns": campaigns, "files": files, "figures": figures}
+for _package in ("campaign", "campaign.reaching", "campaign.workers", "campaign.pages"):
+    TRACES[f"declared in {_package}"] = declared_of(_package)
 test_what_campaigns_come_to_is_what_was_approved = judge_of(__file__, TRACES)

@@ -35,6 +35,7 @@ from robot_bench.recording.variables import MOST_ROWS, VariableWriter, read_vari
 from robot_bench.recording.waveforms import waveforms_of, write_sigrok, write_vcd
 from robot_bench.wires.edges import Edges, pack
 from simbase.errors import P2osError
+from tests.robot_bench.declared import declared_of
 from tests.robot_bench.recording.long_run import META, MORE, long_run
 from tests.robot_bench.recording.records import S
 from tests.tools.suite.approved import judge_of, refusal, said, tried
@@ -411,5 +412,6 @@ TRACES: dict[str, Any] = {
     "views": views,
     "files": files,
     "disputes": disputes,
+    "declared": declared_of("events", "recording"),
 }
 test_what_becomes_of_events_is_what_was_approved = judge_of(__file__, TRACES)

@@ -29,10 +29,11 @@ from robot_bench.experiments.fitting.least_squares import Estimate, Fit, Paramet
 from robot_bench.experiments.fitting.resampling import best_of_resamples, estimate_of
 from robot_bench.experiments.fitting.rounding import grain_of, noise_before
 from robot_bench.experiments.sensitivity import ParameterEffect, SampleDesign, outcome_names, read_range
+from tests.robot_bench.declared import declared_of
 from tests.robot_bench.experiments.synthetic_robots import MAKES, WALLS, Planted
 from tests.robot_bench.experiments.synthetic_robots import drive as driven
 from tests.robot_bench.experiments.test_fits_whole import square_of
-from tests.tools.suite.approved import Trace, figures_of, judge_of, said, tried
+from tests.tools.suite.approved import Trace, judge_of, said, tried
 
 P2DX = load_parameters("p2dx")
 #: Longer arrays are shown by their first values and by sums in which each has another weight.
@@ -491,5 +492,5 @@ TRACES: dict[str, Trace] = {
     "squares": squares, "echoes": echoes, "readings": readings, "shifted": shifted, "files": files, "ranges": ranges,
 }  # fmt: skip
 for _package in ("experiments", "experiments.fitting", "experiments.validation", "drives"):
-    TRACES[f"figures of {_package}"] = figures_of(f"robot_bench.{_package}")
+    TRACES[f"declared in {_package}"] = declared_of(_package)
 test_what_experiments_make_of_drives_is_what_was_approved = judge_of(__file__, TRACES)

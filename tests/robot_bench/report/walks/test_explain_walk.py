@@ -19,6 +19,7 @@ from robot_bench.report.explain.progress import ProgressAnalysis
 from robot_bench.report.explain.replay import ChipReset, Hold, ReplayPart, SourcePlace
 from robot_bench.report.explain.scene import Scene
 from robot_bench.wires.edges import Edges
+from tests.robot_bench.declared import declared_of
 from tests.robot_bench.recording.records import S, pose
 from tests.robot_bench.report.programs_asked import (
     AHEAD,
@@ -30,7 +31,7 @@ from tests.robot_bench.report.programs_asked import (
     poses,
     step_lines,
 )
-from tests.tools.suite.approved import Trace, figures_of, judge_of, said
+from tests.tools.suite.approved import Trace, judge_of, said
 
 MS = S // 1000
 STILL, SPIN, AWAY, BACK = (0, 0), (-2, 2), (2, -2), (-3, -2)
@@ -152,7 +153,7 @@ def told(prober: AskedProber | None) -> str:
 
 def contacts(draw: Random) -> Iterator[str]:
     """Look for why things were touched: ahead, beside, behind, seen or not, by programs of many kinds."""
-    for number in range(160):
+    for number in range(110):
         legs = legs_of(draw, 6.0, (AHEAD, AHEAD, AHEAD, (2, 2), SPIN, BACK))
         record = driven_run(*legs, until_s=6.0, on=rises(draw, 6.0), **rows_of(draw, 6.0))
         if draw.random() < 0.1:
@@ -175,7 +176,7 @@ def contacts(draw: Random) -> Iterator[str]:
 
 def stays(draw: Random) -> Iterator[str]:
     """Look for why robots came no further: reset, let go, stuck, spinning, blind, or as they were meant to."""
-    for number in range(150):
+    for number in range(100):
         until_s = draw.choice((16.0, 24.0))
         ways = draw.choice((ALL_CODES, (AHEAD, STILL), (STILL, SPIN), (SPIN,)))
         legs = [(0.0, STILL), *((max(at, 0.5), codes) for at, codes in legs_of(draw, until_s, ways))]
@@ -200,7 +201,7 @@ def others(draw: Random) -> Iterator[str]:
     """Look into any failure: by its kind, by when it was decided, and by what is odd besides."""
     failures = ("no_collision: it hit", "clearance: 0.1 m", "contact with it", "min_distance: 3 m not driven",
                 "reach: x", "energy: 1 J", "text: nothing in 30 s", "answers: after 12 ms", "")  # fmt: skip
-    for number in range(70):
+    for number in range(45):
         failure, met = draw.choice(failures), draw.random() < 0.3
         says = failure.partition(": ")[2].replace("3", "7")
         contacts_ = [Contact(t=12 * S, what="'crate'", x_m=2.0, y_m=0.1, part="")] * draw.choice((0, 1))
@@ -387,6 +388,6 @@ TRACES: dict[str, Trace] = {
     "contacts": contacts, "stays": stays, "others": others, "parts": parts_of_findings, "exchanges": exchanges,
     "scenes": scenes, "probes": probes,
 }  # fmt: skip
-for _package in ("report", "report.explain"):
-    TRACES[f"figures of {_package}"] = figures_of(f"robot_bench.{_package}")
+for _package in ("report", "report.explain", "view"):
+    TRACES[f"declared in {_package}"] = declared_of(_package)
 test_what_runs_are_explained_by_is_what_was_approved = judge_of(__file__, TRACES)
