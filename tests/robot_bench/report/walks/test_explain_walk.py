@@ -6,8 +6,11 @@ from random import Random
 from types import SimpleNamespace
 from typing import Any
 
+from adapter_sim.pinout import WireRole, load_pinout
 from bluepill_sim.core import BLOCK
 from bluepill_sim.core.recorder import RECORD
+from bluepill_sim.program.functions import UNKNOWN
+from bluepill_sim.stm32f103 import SRAM_BASE
 from robot_bench.events.kinds import Contact, Fault, Note, Verdict, WorldChange
 from robot_bench.recording.run_record import RunRecord
 from robot_bench.report.explain import explain as explaining
@@ -16,7 +19,7 @@ from robot_bench.report.explain.chain import ChainLink, Evidence, Explanation, S
 from robot_bench.report.explain.contact import ContactAnalysis, exchanged
 from robot_bench.report.explain.probing import Codes, InputEffect, Prober, SensorResponse, first_row, parted
 from robot_bench.report.explain.progress import ProgressAnalysis
-from robot_bench.report.explain.replay import ChipReset, Hold, ReplayPart, SourcePlace
+from robot_bench.report.explain.replay import ChipReplay, ChipReset, Hold, ReplayPart, SourcePlace
 from robot_bench.report.explain.scene import Scene
 from robot_bench.wires.edges import Edges
 from tests.robot_bench.declared import declared_of
@@ -83,7 +86,7 @@ def answered(draw: Random) -> Mapping[str, SensorResponse]:
 def rows_of(draw: Random, until_s: float) -> dict[str, object]:
     """Return what else the trace has: faults, notes, changes, waves."""
     at = lambda: round(draw.uniform(0.2, 0.98) * until_s * S)  # noqa: E731 - some time
-    faults = [Fault(t=at(), op=draw.choice(("inject", "inject", "clear")), words=draw.choice(FAULTS))
+    faults = [Fault(t=at(), op=draw.choice(("inject", "inject", "clear", "died")), words=draw.choice(FAULTS))
               for _ in range(draw.choice((0, 1, 3)))]  # fmt: skip
     whats = ("driving", "command", "lost", "motors", "reset")
     notes = [Note(t=at(), who=draw.choice(("adapter", "adapter", "body")), detail=draw.choice(("", "VEL 100")),
@@ -305,6 +308,37 @@ def scenes(draw: Random) -> Iterator[str]:
         yield said([[scene.inside_m(one, scene.pose(hit.t), hit.x_m, hit.y_m)] for one in scene.sensors])
 
 
+def replays(draw: Random) -> Iterator[str]:
+    """Ask a replay what its trace and its program say: levels, since when, lines and variables."""
+    for _ in range(12):
+        net, at = "DD4", 0
+        edges = Edges([(0, draw.randrange(2))])
+        for _ in range(draw.choice((0, 1, 4))):
+            at += draw.choice((5, 900))
+            edges.append(at, 1 - edges[-1][1])
+        replay: Any = object.__new__(ChipReplay)
+        replay.record = SimpleNamespace(pins={net: edges})
+        replay.wires = {wire.name: wire for wire in load_pinout().wires}
+        symbols = [
+            SimpleNamespace(name=name, is_function=is_function, address=SRAM_BASE + offset, size=size)
+            for name, is_function, offset, size in (
+                ("f", True, 0, 8), ("a", False, 4, 4), ("b", False, 8, 0), ("c", False, 10, 2), ("d", False, 1 << 20, 4)
+            )
+        ]  # fmt: skip
+        replay.board = SimpleNamespace(image=SimpleNamespace(symbols=SimpleNamespace(symbols=symbols)))
+        replay._functions = SimpleNamespace(name=lambda address: "main" if address < 8 else UNKNOWN)
+        replay._lines = SimpleNamespace(place=lambda address: f"a.c:{address}" * (address % 3 > 0))
+        replay._code = SimpleNamespace(block=lambda block: SimpleNamespace(addresses=[block, block + 2] * (block > 4)))
+        times = [0, 1, 5, at - 1, at, at + 1]
+        yield said([list(edges), [(replay.level(net, one), replay.high_since(net, one)) for one in times]])
+        yield said([[replay.variable_at(place) for place in range(13)], replay.variables, replay.pin("DD4")])
+        yield said([[str(replay.line(one)) for one in range(5, 10)], [str(replay.end_line(one)) for one in (2, 5, 8)]])
+        yield said([replay.role(role) for role in WireRole])
+        part = ReplayPart(levels={"a": True, "b": False}, edges=[(3, "a", False), (5, "b", True)])
+        yield said([part.levels_at(one) for one in (2, 3, 4, 5)])
+    yield said([str(one) for one in PLACES] + [str(SourcePlace("", "f", ("g",)))])
+
+
 class MadeReplay:
     """A replay whose parts are drawn, and that notes what it is asked."""
 
@@ -386,7 +420,7 @@ def probes(draw: Random) -> Iterator[str]:
 
 TRACES: dict[str, Trace] = {
     "contacts": contacts, "stays": stays, "others": others, "parts": parts_of_findings, "exchanges": exchanges,
-    "scenes": scenes, "probes": probes,
+    "scenes": scenes, "probes": probes, "replays": replays,
 }  # fmt: skip
 for _package in ("report", "report.explain", "view"):
     TRACES[f"declared in {_package}"] = declared_of(_package)
