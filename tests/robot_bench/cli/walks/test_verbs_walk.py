@@ -174,6 +174,7 @@ shrink .
 shrink dodge --firmware nowhere.elf
 shrink dodge --goal none
 shrink dodge --out taken
+shrink dodge --out taken/x.toml
 check
 check nowhere
 check dodge rover motors

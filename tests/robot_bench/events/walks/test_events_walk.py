@@ -167,6 +167,9 @@ def words(_draw: Random) -> Iterator[str]:
             else:
                 other = type(value)() if value else value
             yield said(distinguishing_words(event, replace(event, **{field.name: other})))
+            if isinstance(value, bytes | str | tuple):
+                empty: Any = type(value)()
+                yield tried(words_of, replace(event, **{field.name: empty}))
     yield said(last_words(events, 5))
     yield said(distinguishing_words(events[0], events[-1]))
 

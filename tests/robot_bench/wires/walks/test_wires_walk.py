@@ -68,7 +68,9 @@ def nets(draw: Random) -> Iterator[str]:
                 times = array("q", sorted({now + draw.randrange(30) for _ in range(3)}))
                 done = tried(net.drive_in_turn, owner, times, bytes(draw.randrange(7) for _ in times))
             elif chance < 0.65 and may_wave:
-                done = tried(net.wave_from, owner, wave_drive(draw, now), now)
+                again = net.drive_at(owner, now)
+                shape = again if again is not None and draw.random() < 0.4 else wave_drive(draw, now)
+                done = tried(net.wave_from, owner, shape, now)
             elif chance < 0.72:
                 done = tried(net.release, owner, now)
             elif chance < 0.9:
