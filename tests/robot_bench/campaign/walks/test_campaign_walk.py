@@ -36,8 +36,8 @@ from robot_bench.cli.campaigns import campaign as verb
 from robot_bench.scenario.loading import load_scenario
 from simbase.errors import P2osError
 from tests.robot_bench.campaign.test_campaign import Shuffled
-from tests.robot_bench.declared import declared_of
 from tests.tools.suite.approved import Trace, judge_of, rounded, said, tried
+from tests.tools.suite.declared import declared_of
 
 SCENARIO = """
 firmware = "dodge.elf"
@@ -358,5 +358,5 @@ TRACES: dict[str, Trace] = {
     "campaigns": campaigns, "files": files, "figures": figures, "things": drawn_things,
 }  # fmt: skip
 for _package in ("campaign", "campaign.reaching", "campaign.workers", "campaign.pages"):
-    TRACES[f"declared in {_package}"] = declared_of(_package)
+    TRACES[f"declared in {_package}"] = declared_of(f"robot_bench.{_package}")
 test_what_campaigns_come_to_is_what_was_approved = judge_of(__file__, TRACES)

@@ -34,8 +34,8 @@ from robot_bench.scenario.loading import load_scenario
 from robot_bench.scenario.scenario import Scenario
 from robot_bench.wires.board_test.verdicts import BoardVerdict, VerdictRow
 from simbase.errors import FileError, P2osError
-from tests.robot_bench.declared import declared_of
 from tests.tools.suite.approved import judge_of, rounded, said, tried
+from tests.tools.suite.declared import declared_of
 
 
 @contextlib.contextmanager
@@ -627,7 +627,9 @@ TRACES = {
     "studies": studies,
     "projects": projects,
     "completions": completions,
-    "declared": declared_of("cli", "cli.experiments", "cli.campaigns", "cli.project"),
+    "declared": declared_of(
+        "robot_bench.cli", "robot_bench.cli.experiments", "robot_bench.cli.campaigns", "robot_bench.cli.project"
+    ),
 }
 
 test_what_verbs_have_and_show_is_what_was_approved = judge_of(__file__, TRACES)

@@ -26,11 +26,11 @@ from robot_bench.direct.differential.robot import DifferentialRobot
 from robot_bench.direct.differential.robot_file import TABLES, load_differential
 from robot_bench.direct.senses import WorldSenses
 from robot_bench.wires.nets import Net, Strength, WaveDrive
-from tests.robot_bench.declared import declared_of
 from tests.robot_bench.direct.robots import ROVER, rover
 from tests.robot_bench.direct.test_differential import MS, Rig
 from tests.robot_bench.direct.test_direct import nets, set_value
 from tests.tools.suite.approved import judge_of, said, tried
+from tests.tools.suite.declared import declared_of
 
 PP = Strength.PUSH_PULL
 HOUR = 3_600_000 * MS
@@ -270,6 +270,7 @@ def descriptions(draw: Random) -> Iterator[str]:
 
 TRACES = {
     "bridges": bridges, "encoders": encoders, "robots": robots, "pioneers": pioneers, "senses": senses,
-    "descriptions": descriptions, "trains": trains, "declared": declared_of("direct", "direct.differential"),
+    "descriptions": descriptions, "trains": trains,
+    "declared": declared_of("robot_bench.direct", "robot_bench.direct.differential"),
 }  # fmt: skip
 test_what_robots_on_wires_do_is_what_was_approved = judge_of(__file__, TRACES)

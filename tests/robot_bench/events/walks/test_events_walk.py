@@ -36,10 +36,10 @@ from robot_bench.recording.variables import MOST_ROWS, VariableWriter, read_vari
 from robot_bench.recording.waveforms import waveforms_of, write_sigrok, write_vcd
 from robot_bench.wires.edges import Edges, pack
 from simbase.errors import P2osError
-from tests.robot_bench.declared import declared_of
 from tests.robot_bench.recording.long_run import META, MORE, long_run
 from tests.robot_bench.recording.records import S
 from tests.tools.suite.approved import judge_of, refusal, said, tried
+from tests.tools.suite.declared import declared_of
 
 BLOCK = next(pack([Edges([(5, 1), (9, 0)]), Edges([(7, 1)]), Edges()], 9))
 BULK = [
@@ -442,6 +442,6 @@ TRACES: dict[str, Any] = {
     "files": files,
     "disputes": disputes,
     "signals": signals,
-    "declared": declared_of("events", "recording"),
+    "declared": declared_of("robot_bench.events", "robot_bench.recording"),
 }
 test_what_becomes_of_events_is_what_was_approved = judge_of(__file__, TRACES)

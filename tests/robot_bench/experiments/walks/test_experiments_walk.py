@@ -19,7 +19,6 @@ from robot_bench.experiments.aria_logs import is_aria_log, read_aria_log
 from robot_bench.experiments.comparison import How, compare
 from robot_bench.experiments.drive_files import is_recording, read_drive, write_tum
 from robot_bench.experiments.sensitivity import ParameterEffect, SampleDesign, outcome_names, read_range
-from tests.robot_bench.declared import declared_of
 from tests.robot_bench.experiments.walks.drawn_drives import (
     P2DX,
     of_drive,
@@ -30,6 +29,7 @@ from tests.robot_bench.experiments.walks.drawn_drives import (
     way_of,
 )
 from tests.tools.suite.approved import Trace, judge_of, said, tried
+from tests.tools.suite.declared import declared_of
 
 
 def trajectories(draw: Random) -> Iterator[str]:
@@ -243,6 +243,6 @@ def ranges(draw: Random) -> Iterator[str]:
 
 TRACES: dict[str, Trace] = {
     "trajectories": trajectories, "onsets": onsets, "partings": partings, "files": files,
-    "declared": declared_of("drives", "experiments"), "ranges": ranges,
+    "declared": declared_of("robot_bench.drives", "robot_bench.experiments"), "ranges": ranges,
 }  # fmt: skip
 test_what_experiments_make_of_drives_is_what_was_approved = judge_of(__file__, TRACES)

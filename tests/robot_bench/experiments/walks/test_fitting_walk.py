@@ -16,7 +16,6 @@ from robot_bench.experiments.fitting.echoes import Bearings
 from robot_bench.experiments.fitting.least_squares import Estimate, Fit, Parameter, Rounding, fit
 from robot_bench.experiments.fitting.resampling import best_of_resamples, estimate_of
 from robot_bench.experiments.fitting.rounding import grain_of, noise_before
-from tests.robot_bench.declared import declared_of
 from tests.robot_bench.experiments.synthetic_robots import MAKES, WALLS, Planted
 from tests.robot_bench.experiments.synthetic_robots import drive as driven
 from tests.robot_bench.experiments.test_fits_whole import square_of
@@ -29,6 +28,7 @@ from tests.robot_bench.experiments.walks.drawn_drives import (
     way_of,
 )
 from tests.tools.suite.approved import Trace, judge_of, said, tried
+from tests.tools.suite.declared import declared_of
 
 
 def synthetic(seed: int, seconds: float, make: str = "rounded") -> Drive:
@@ -224,6 +224,6 @@ def shifted(draw: Random) -> Iterator[str]:
 
 TRACES: dict[str, Trace] = {
     "fits": fits, "ramped": ramped, "squares": squares, "echoes": echoes, "readings": readings, "shifted": shifted,
-    "declared": declared_of("experiments.fitting"),
+    "declared": declared_of("robot_bench.experiments.fitting"),
 }  # fmt: skip
 test_what_is_fitted_to_drives_is_what_was_approved = judge_of(__file__, TRACES)

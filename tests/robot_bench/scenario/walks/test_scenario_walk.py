@@ -45,8 +45,8 @@ from robot_bench.scenario.trigger_script import TriggerScript, load_triggers
 from robot_bench.scenario.wired_robots import find_own_robot, known_own_robots
 from robot_bench.scenario.world_script import WorldScript, load_changes, placed_things
 from simbase.errors import P2osError
-from tests.robot_bench.declared import declared_of
 from tests.tools.suite.approved import judge_of, refusal, said, tried
+from tests.tools.suite.declared import declared_of
 
 #: Imported, so that it stands near these.
 PARTS = (PartTable, ScenarioOptions, MOST_ROBOTS)
@@ -796,6 +796,7 @@ def triggers(draw: Random) -> Iterator[str]:
 
 TRACES = {
     "settings": settings, "lines": lines, "included": included, "many": many, "options": options, "hands": hands,
-    "scripts": scripts, "triggers": triggers, "declared": declared_of("scenario", "scenario.hands"),
+    "scripts": scripts, "triggers": triggers,
+    "declared": declared_of("robot_bench.scenario", "robot_bench.scenario.hands"),
 }  # fmt: skip
 test_what_scenarios_say_is_what_was_approved = judge_of(__file__, TRACES)

@@ -25,9 +25,9 @@ from robot_bench.wires.serial_line import SerialLine
 from robot_bench.wires.waves import edge_times
 from simbase.timing import NS_PER_S, Reached
 from tests.bluepill_sim.fabric.test_waves import Ports
-from tests.robot_bench.declared import declared_of
 from tests.tools.suite.acted import Acted, taken
 from tests.tools.suite.approved import Trace, judge_of, said, tried
+from tests.tools.suite.declared import declared_of
 
 OWNERS = ("chip", "adapter", "board")
 
@@ -320,5 +320,5 @@ TRACES: dict[str, Trace] = {
     "power": power,
 }  # fmt: skip
 for _package in ("wires", "wires.board_test"):
-    TRACES[f"declared in {_package}"] = declared_of(_package)
+    TRACES[f"declared in {_package}"] = declared_of(f"robot_bench.{_package}")
 test_what_wires_carry_is_what_was_approved = judge_of(__file__, TRACES)

@@ -29,9 +29,9 @@ from robot_bench.experiments.validation.silence import silence_figures
 from robot_bench.scenario.goals.judging import Judgement
 from robot_bench.scenario.scenario import Scenario
 from simbase.timing import NS_PER_S
-from tests.robot_bench.declared import declared_of
 from tests.robot_bench.experiments.validation.test_validation_findings import MODES, MadeRun, nominal_of
 from tests.tools.suite.approved import Trace, judge_of, said, tried
+from tests.tools.suite.declared import declared_of
 
 
 def measures_of(
@@ -129,6 +129,6 @@ def trials_asked(draw: Random) -> Iterator[str]:
 
 
 TRACES: dict[str, Trace] = {
-    "validations": validations, "trials": trials_asked, "declared": declared_of("experiments.validation"),
+    "validations": validations, "trials": trials_asked, "declared": declared_of("robot_bench.experiments.validation"),
 }  # fmt: skip
 test_what_validations_come_to_is_what_was_approved = judge_of(__file__, TRACES)

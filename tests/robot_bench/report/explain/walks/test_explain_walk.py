@@ -22,7 +22,6 @@ from robot_bench.report.explain.progress import ProgressAnalysis
 from robot_bench.report.explain.replay import ChipReplay, ChipReset, Hold, ReplayPart, SourcePlace
 from robot_bench.report.explain.scene import Scene
 from robot_bench.wires.edges import Edges
-from tests.robot_bench.declared import declared_of
 from tests.robot_bench.recording.records import S, pose
 from tests.robot_bench.report.programs_asked import (
     AHEAD,
@@ -35,6 +34,7 @@ from tests.robot_bench.report.programs_asked import (
     step_lines,
 )
 from tests.tools.suite.approved import Trace, judge_of, said
+from tests.tools.suite.declared import declared_of
 
 MS = S // 1000
 STILL, SPIN, AWAY, BACK = (0, 0), (-2, 2), (2, -2), (-3, -2)
@@ -150,7 +150,7 @@ def program(draw: Random, record: RunRecord, hit: int | None) -> AskedProber:
     )  # fmt: skip
 
 
-def told(prober: AskedProber | None) -> str:
+def asked_of(prober: AskedProber | None) -> str:
     return "" if prober is None else said(prober.asked)
 
 
@@ -173,7 +173,7 @@ def contacts(draw: Random) -> Iterator[str]:
         analysis = ContactAnalysis(scene, prober, hit)  # type: ignore[arg-type]  # as much of it as is asked
         yield f"{number} {legs} {said([analysis.bearing, analysis.since, analysis.expected, analysis.on])}"
         finding = analysis.find()
-        yield f"{finding} {told(prober)}"
+        yield f"{finding} {asked_of(prober)}"
         yield " | ".join(step_lines(analysis.steps))
 
 
@@ -196,7 +196,7 @@ def stays(draw: Random) -> Iterator[str]:
         prober = program(draw, record, None) if draw.random() < 0.92 else None
         analysis = ProgressAnalysis(Scene(record), prober, record.last_ns)  # type: ignore[arg-type]
         finding = analysis.find()
-        yield f"{number} {legs} {finding} {told(prober)}"
+        yield f"{number} {legs} {finding} {asked_of(prober)}"
         yield " | ".join(step_lines(analysis.steps))
 
 
@@ -221,7 +221,7 @@ def others(draw: Random) -> Iterator[str]:
             prober.replay.line = lambda address: SourcePlace(f"a.c:{address}", "f")  # type: ignore[attr-defined]
             prober.replay.role = lambda _role: ("encoder1_s1", "encoder2_s1")  # type: ignore[attr-defined]
         finding, steps = explaining._find(record, Scene(record), prober, failure or "x")  # type: ignore[arg-type]
-        yield f"{number} {failure} {finding} {explaining._decided(record, failure)} {told(prober)}"
+        yield f"{number} {failure} {finding} {explaining._decided(record, failure)} {asked_of(prober)}"
         yield f"{' | '.join(step_lines(steps))} {explaining._odd(prober)}"  # type: ignore[arg-type]
         for wanted in ("", "odd", "never"):
             whole = explaining.explain(record, None, failure=wanted)
@@ -267,7 +267,7 @@ def parts_of_findings(draw: Random) -> Iterator[str]:
         prober.lines = [(0.0, ends_s, {"a.c:1": 3, "a.c:4": 4}), (ends_s, 99.0, after)]
         steps = []
         ended = findings.ended(prober, at, at + draw.choice((S, 8 * S)), steps)  # type: ignore[arg-type]
-        yield f"{ended} {' '.join(step_lines(steps))} {said(findings.ran_over(prober, at))} {told(prober)}"  # type: ignore[arg-type]
+        yield f"{ended} {' '.join(step_lines(steps))} {said(findings.ran_over(prober, at))} {asked_of(prober)}"  # type: ignore[arg-type]
         yield said(findings.read_gap(prober, at))  # type: ignore[arg-type]
     yield said([findings.numbers(names) for names in ([], ["a"], ["a", "b"], ["a", "b", "c"])])
 
@@ -423,5 +423,5 @@ TRACES: dict[str, Trace] = {
     "scenes": scenes, "probes": probes, "replays": replays,
 }  # fmt: skip
 for _package in ("report", "report.explain", "view"):
-    TRACES[f"declared in {_package}"] = declared_of(_package)
+    TRACES[f"declared in {_package}"] = declared_of(f"robot_bench.{_package}")
 test_what_runs_are_explained_by_is_what_was_approved = judge_of(__file__, TRACES)

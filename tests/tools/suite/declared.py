@@ -30,12 +30,12 @@ def declared_of(*packages: str) -> Trace:
     """Return the trace of what modules declare.
 
     Args:
-        packages: Of `robot_bench`, those in which they stand; "" for itself. Packages in them are not gone through.
+        packages: In which they stand, with their full names; packages in them are not gone through.
     """
 
     def declared(_draw: Random) -> Iterator[str]:
         for package in packages:
-            root = importlib.import_module(f"robot_bench.{package}".rstrip("."))
+            root = importlib.import_module(package)
             yield from _of_module(root)
             names = sorted(file.stem for file in Path(root.__path__[0]).glob("*.py") if file.stem != "__init__")
             for name in names:
