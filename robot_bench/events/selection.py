@@ -433,19 +433,17 @@ class _Goal(Selector):
         return isinstance(event, Verdict) and event.met is self._is_met
 
 
-_USART = ("usart1 sends TEXT", _Usart)
-_I2C, _SPI = ("i2c1 writes 0x3c", _I2c), ("spi1 sends 9f 00", _Spi)
 #: First word → how it is written, and what picks the events.
 SELECTORS: Mapping[str, tuple[str, Callable[[str, str], Selector]]] = {
     "pin": ("pin PB12 high", _Pin),
-    "usart1": _USART,
-    "usart2": _USART,
-    "usart3": _USART,
+    "usart1": ("usart1 sends TEXT", _Usart),
+    "usart2": ("usart2 sends TEXT", _Usart),
+    "usart3": ("usart3 sends TEXT", _Usart),
     "usb": ("usb sends TEXT", _Usart),
-    "i2c1": _I2C,
-    "i2c2": _I2C,
-    "spi1": _SPI,
-    "spi2": _SPI,
+    "i2c1": ("i2c1 writes 0x3c", _I2c),
+    "i2c2": ("i2c2 writes 0x3c", _I2c),
+    "spi1": ("spi1 sends 9f 00", _Spi),
+    "spi2": ("spi2 sends 9f 00", _Spi),
     "can": ("can hears 0x123", _Can),
     "contact": ("contact [NAME]", _Contact),
     "robot": ("robot near X Y RADIUS", _Robot),

@@ -35,6 +35,8 @@ MOST_FILES = 64
 FILES: Mapping[str, tuple[str, ...]] = {
     "": ("firmware", "world", "robot"), "controller": ("errors", "flash"), "robot": ("firmware", "model"),
 }  # fmt: skip
+#: Keys that name files, which are put together before any key is set.
+NAMING = ("extends", "include")
 #: Key and value, as of `--set`.
 Setting = tuple[str, object]
 
@@ -150,7 +152,7 @@ def read_tables(path: Path, settings: Sequence[Setting] = (), set_by: str = "--s
 
     Raises:
         ScenarioError: A file cannot be read or is no TOML, or files include each other in a circle.
-        UsageError: A setting names a table of a list that is not there.
+        UsageError: A setting names a table of a list that is not there, or a file.
     """
     found = _read(path, path.parent, (), [0])
     places: dict[tuple[str, int, str], str] = {}
@@ -206,10 +208,13 @@ def set_key(table: dict[str, object], key: str, value: object) -> tuple[str, int
         value: What TOML can hold.
 
     Raises:
-        UsageError: It names a table of a list that is not there, or goes through what is no table.
+        UsageError: It names a table of a list that is not there, goes through what is no table, or is of `NAMING`.
     """
     held, name, number = table, "", 0
     *path, last = key.split(".")
+    if (first := [*path, last][0]) in NAMING:
+        raise UsageError(f"--set {key}: files are named in the scenario's own file",
+                         hint=f'a file of your own with {first} = "..."')  # fmt: skip
     while path:
         word = path.pop(0)
         inner = held.setdefault(word, {})
@@ -235,7 +240,7 @@ def _read(path: Path, folder: Path, above: tuple[Path, ...], count: list[int]) -
     table, places = read_toml(text, name, SCENARIO, ScenarioError)
     place = TablePlace(TomlSource(name, places))
     own, _ = read_part(IncludeTable, table, place)
-    table = {name: value for name, value in table.items() if name not in {"extends", "include"}}
+    table = {name: value for name, value in table.items() if name not in NAMING}
     seen_from(table, path.parent, folder)
     found = _Read(table=table, parts=(_Part(TomlSource(name, places)),), texts=(f"{name}:\n{text}",))
     here = (*above, path)

@@ -40,7 +40,8 @@ def without_delays(fit: Fit, why: str) -> Fit:
     if not why:
         return fit
     estimates = {name: one for name, one in fit.estimates.items() if name not in DELAYS}
-    return replace(fit, estimates=estimates, unseen=fit.unseen | dict.fromkeys(fit.estimates.keys() & set(DELAYS), why))
+    delays = [name for name in DELAYS if name in fit.estimates]
+    return replace(fit, estimates=estimates, unseen=fit.unseen | dict.fromkeys(delays, why))
 
 
 def _shift_s(drive: Drive) -> float:

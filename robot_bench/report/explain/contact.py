@@ -242,7 +242,7 @@ class ContactAnalysis:
             return None
         asked = [answers for answers in self._asked if sum(answers[prober.sensors[0]].base) > 0]
         found = exchanged(prober.sensors, asked, self._side) if len(asked) >= AGREEING else ""
-        near = {*self.on, *self.expected}
+        near = dict.fromkeys((*self.on, *self.expected))
         wrong = [
             net
             for net in (prober.sensors if found.startswith("left and") else near)

@@ -113,7 +113,7 @@ def doing_of(do: str, keys: Table, parameters: RobotParameters, place: Where, wi
     """
     action = read(ACTION_TABLES[do], keys, place)
     if isinstance(action, ThingTable):
-        changes = changes_of(action, Op(do), 0, parameters, f"{place}: [[obstacle]] 1")
+        changes = changes_of(action, Op(do), 0, parameters, str(place))
         return Doing(changes=tuple(changes))
     if isinstance(action, EndTable):
         return Doing()
@@ -122,4 +122,4 @@ def doing_of(do: str, keys: Table, parameters: RobotParameters, place: Where, wi
     if do == "clear":
         return Doing(faults=(FaultChange(0, f"clear {action.words}"),))
     fault = FaultTable(at_s=0, fault=action.words, for_s=action.for_s)
-    return Doing(faults=faults_of(fault, parameters, f"{place}: [[fault]] 1"))
+    return Doing(faults=faults_of(fault, parameters, place))

@@ -152,8 +152,11 @@ def test_each_first_word_is_tried() -> None:
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        ("", "no events '' (hint: events: pin PB12 high; usart1 sends TEXT; usart1 sends TEXT; usart1 sends TEXT; "),
-        ("", "usb sends TEXT; i2c1 writes 0x3c; i2c1 writes 0x3c; spi1 sends 9f 00; spi1 sends 9f 00; can hears 0x123"),
+        ("", "no events '' (hint: events: pin PB12 high; usart1 sends TEXT; usart2 sends TEXT; usart3 sends TEXT; "),
+        ("", "usb sends TEXT; i2c1 writes 0x3c; i2c2 writes 0x3c; spi1 sends 9f 00; spi2 sends 9f 00; can hears 0x123"),
+        ("usart2 says x", "(hint: such as usart2 sends TEXT)"),
+        ("i2c2 writes", "(hint: such as i2c2 writes 0x3c)"),
+        ("spi2 sends", "(hint: such as spi2 sends 9f 00)"),
         ("", "0x123; contact [NAME]; robot near X Y RADIUS; time 5.0; sonar 3 below 0.4; note adapter driving; fault"),
         ("", "driving; fault [WORDS]; thing NAME; packet PULSE; goal missed)"),
         ("pins DD1 high", "no events 'pins DD1 high' (hint: did you mean 'pin'?)"),

@@ -147,6 +147,13 @@ def test_a_key_is_set_after_all_files_and_an_error_names_the_option(tmp_path: Pa
     assert refused(path, "threshold_m.x=1") == "--set threshold_m.x: 'threshold_m' is no table with keys"
 
 
+@pytest.mark.parametrize("setting", ["extends=gone", "include=x", 'include=["base.toml"]', "extends.x=1"])
+def test_files_cannot_be_named_beside_the_file_that_names_them(setting: str, tmp_path: Path) -> None:
+    path = write(tmp_path, base=BASE, mine='extends = "base.toml"\n')
+    key = setting.partition("=")[0]
+    assert refused(path, setting) == f"--set {key}: files are named in the scenario's own file"
+
+
 PLAIN = st.text(st.characters(codec="ascii", exclude_categories=["Cc"], exclude_characters='"\\ '), min_size=1)
 NUMBERS = st.one_of(st.booleans(), st.integers(), st.floats(allow_nan=False, allow_infinity=False))
 

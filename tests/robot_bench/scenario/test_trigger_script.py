@@ -11,6 +11,7 @@ from p2os.errors import ScenarioError
 from p2os.robots.parameters import load_parameters
 from robot_bench.bench import Bench
 from robot_bench.events.kinds import Fault, PinEdge, WorldChange
+from robot_bench.scenario.hands.timed import load_hands
 from robot_bench.scenario.trigger_script import load_triggers
 from tests.robot_bench.test_bench import MS, S, bench, scenario
 
@@ -102,6 +103,22 @@ def test_a_bench_saved_between_event_and_action_goes_on_alike() -> None:
     assert second.trace.text == whole.trace.text
     (text,) = [t for t, line in whole.record().usart if b"hello" in line]
     assert [fault.t for fault in whole.record().faults] == [text + 500 * MS]
+
+
+@pytest.mark.parametrize(
+    ("keys", "says"),
+    [
+        ({"do": "inject", "fault": "sonar-ded 3"}, "no fault 'sonar-ded'"),
+        ({"do": "inject", "fault": "reboot", "for_s": 1.0}, "for_s, but reboot happens once"),
+        ({"do": "place", **POST}, "key 'x_m' is missing"),
+        ({"do": "place", **POST, "before_sonar": 99}, "before_sonar = 99, the robot has 8"),
+    ],
+)
+def test_what_cannot_be_done_is_refused_by_the_table_that_asks_for_it(keys: dict[str, object], says: str) -> None:
+    for load, table, kind in ((load_triggers, {"event": "contact"}, "when"), (load_hands, {"at_s": 1.0}, "hand")):
+        with pytest.raises(ScenarioError) as caught:
+            load([table | keys], P2DX, "x.toml")
+        assert str(caught.value) == f"x.toml: [[{kind}]] 1: {says}"
 
 
 @pytest.mark.parametrize(

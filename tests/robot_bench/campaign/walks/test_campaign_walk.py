@@ -1,6 +1,7 @@
 """Campaigns whose runs are made up: what is asked, found, printed, written and shown of them, to the last figure."""
 
 import contextlib
+import dataclasses
 import io
 import itertools
 import json
@@ -16,6 +17,8 @@ from unittest import mock
 import typer
 from pyarrow import parquet
 
+from p2os.pioneer.world import load_world
+from robot_bench.campaign import things
 from robot_bench.campaign import whole as whole_module
 from robot_bench.campaign.campaign_file import CampaignTable, campaign_schema, parse_campaign
 from robot_bench.campaign.conduct import CampaignProgress
@@ -33,7 +36,8 @@ from robot_bench.cli.campaigns import campaign as verb
 from robot_bench.scenario.loading import load_scenario
 from simbase.errors import P2osError
 from tests.robot_bench.campaign.test_campaign import Shuffled
-from tests.tools.suite.approved import judge_of, rounded, said, tried
+from tests.tools.suite.approved import Trace, judge_of, rounded, said, tried
+from tests.tools.suite.declared import declared_of
 
 SCENARIO = """
 firmware = "dodge.elf"
@@ -324,5 +328,35 @@ def figures(draw: Random) -> Iterator[str]:
     yield said([page._correlation([(1.0, 1.0), (1.0, 2.0)]), page._last(None)])
 
 
-TRACES = {"campaigns": campaigns, "files": files, "figures": figures}
+def drawn_things(draw: Random) -> Iterator[str]:
+    """Place things of each kind in rooms: where they are wanted, nearby, or nowhere."""
+    world = load_world("room")
+    for name, kind in things.KINDS.items():
+        yield said([name, kind.doc, kind.measures, kind.walks])
+        for _ in range(6):
+            measures = {key: round(draw.uniform(*ends), 3) for key, ends in kind.measures.items()}
+            place = (
+                round(draw.uniform(-2.6, 2.6), 3),
+                round(draw.uniform(-2, 2), 3),
+                draw.choice((0.0, 30.0, 359.9, -90.0)),
+            )
+            yield said([measures, kind.boxes(measures)])
+            parts = [things._placed(part, *place) for part in kind.boxes(measures)]
+            thing = things.DrawnThing(
+                name="t", kind=name, place=place, measures=measures, gap_m=draw.choice((None, 0.0, 0.9))
+            )
+            yield said([place, parts, [things._table("t", part, thing, place[2]) for part in parts]])
+            one, other = (things.Footprint(things._obstacle(draw.choice(parts))) for _ in range(2))
+            far = things.Footprint(things._obstacle({"x_m": 0.4, "y_m": 0.1, "radius_m": 0.2}))
+            yield said([things._apart_m(one, other), things._apart_m(one, far), things._apart_m(far, one)])
+            room = things.Room(world=world, starts=[world.start], gap_m=draw.choice((0.0, 0.3)), free_m=0.6)
+            yield said(room.tables([thing, dataclasses.replace(thing, name="u"), dataclasses.replace(thing, name="v")]))
+    yield said([things._places((1.0, 2.0, 3.0))[:4], len(things._places((0.0, 0.0, 0.0)))])
+
+
+TRACES: dict[str, Trace] = {
+    "campaigns": campaigns, "files": files, "figures": figures, "things": drawn_things,
+}  # fmt: skip
+for _package in ("campaign", "campaign.reaching", "campaign.workers", "campaign.pages"):
+    TRACES[f"declared in {_package}"] = declared_of(f"robot_bench.{_package}")
 test_what_campaigns_come_to_is_what_was_approved = judge_of(__file__, TRACES)

@@ -35,6 +35,7 @@ from robot_bench.scenario.scenario import Scenario
 from robot_bench.wires.board_test.verdicts import BoardVerdict, VerdictRow
 from simbase.errors import FileError, P2osError
 from tests.tools.suite.approved import judge_of, rounded, said, tried
+from tests.tools.suite.declared import declared_of
 
 
 @contextlib.contextmanager
@@ -173,6 +174,7 @@ shrink .
 shrink dodge --firmware nowhere.elf
 shrink dodge --goal none
 shrink dodge --out taken
+shrink dodge --out taken/x.toml
 check
 check nowhere
 check dodge rover motors
@@ -625,6 +627,9 @@ TRACES = {
     "studies": studies,
     "projects": projects,
     "completions": completions,
+    "declared": declared_of(
+        "robot_bench.cli", "robot_bench.cli.experiments", "robot_bench.cli.campaigns", "robot_bench.cli.project"
+    ),
 }
 
 test_what_verbs_have_and_show_is_what_was_approved = judge_of(__file__, TRACES)

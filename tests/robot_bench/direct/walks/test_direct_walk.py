@@ -18,9 +18,9 @@ from p2os.toml_file import TomlSource
 from p2os.toml_schema import TablePlace
 from robot_bench.direct import DirectRobot, DistanceSensors, JointMotor, WheelEncoder
 from robot_bench.direct.differential.analog import DischargingBattery, volts_at
-from robot_bench.direct.differential.bridge import HBridge
+from robot_bench.direct.differential.bridge import HBridge, Shares
 from robot_bench.direct.differential.description import GP2Y0A21, BridgeDescription, BridgeKind, Off
-from robot_bench.direct.differential.drive_train import no_load_radps
+from robot_bench.direct.differential.drive_train import DriveTrain, no_load_radps
 from robot_bench.direct.differential.quadrature import Quadrature
 from robot_bench.direct.differential.robot import DifferentialRobot
 from robot_bench.direct.differential.robot_file import TABLES, load_differential
@@ -30,6 +30,7 @@ from tests.robot_bench.direct.robots import ROVER, rover
 from tests.robot_bench.direct.test_differential import MS, Rig
 from tests.robot_bench.direct.test_direct import nets, set_value
 from tests.tools.suite.approved import judge_of, said, tried
+from tests.tools.suite.declared import declared_of
 
 PP = Strength.PUSH_PULL
 HOUR = 3_600_000 * MS
@@ -83,6 +84,33 @@ def encoders(draw: Random) -> Iterator[str]:
             found = [(at - begin, level) for net in (a, b) for at, level in net.edges_until(begin)]
             rows = f"{len(found)} {sum((n + 1) * -at + level for n, (at, level) in enumerate(found))}"
             yield f"{exact(angle, encoder._angle)} room {encoder.struct.room}: {found if len(found) < 9 else rows}"
+
+
+def trains(draw: Random) -> Iterator[str]:
+    """Step two motors with volts, brakes and friction of all sizes, alone and with a body that goes its own way."""
+    parts: tuple[dict[str, dict[str, object]], ...] = (
+        {}, {"motor": {"friction_nm": 0.0, "damping_nm_s": 0.0}}, {"motor": {"friction_nm": 0.02}},
+        {"bridge": {"drop_v": 1.5}},
+    )  # fmt: skip
+    for changes in parts:
+        train, cell = DriveTrain(rover(**changes), 1e-3), DischargingBattery(rover().battery)
+        yield exact(train.own, train.other)
+        for _ in range(60):
+            left, right = (Shares(*draw.choice((
+                (0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (0.3, 0.1, 0.6), (0.02, 0, 0), (0, 0.05, 0.9)
+            ))) for _ in range(2))  # fmt: skip
+            if draw.random() < 0.2:
+                train.left_radps = draw.choice((0.0, 0.001, 3.0, -20.0))
+            source, ohm, idle = draw.choice((7.4, 0.5, 0.0)), draw.choice((0.0, 0.3)), draw.choice((0.0, 0.1, 30.0))
+            volts = train.supply_v(left, right, source, ohm, idle)
+            aims = [value for aim in train.aims(left, right, volts) for value in aim]
+            if draw.random() < 0.3:
+                made = train.take(left, right, volts, draw.uniform(-9, 9), draw.uniform(-9, 9))
+            else:
+                made = train.step(left, right, volts)
+            cell.give(draw.choice((0.0, 3.0, -1.0)), draw.choice((1.0, 900.0)))
+            yield exact(volts, *aims, *made, *train.currents_a, train.left_radps, train.right_radps, train.kinetic_j,
+                        cell.used_ah, cell.source_v)  # fmt: skip
 
 
 def robots(draw: Random) -> Iterator[str]:
@@ -242,6 +270,7 @@ def descriptions(draw: Random) -> Iterator[str]:
 
 TRACES = {
     "bridges": bridges, "encoders": encoders, "robots": robots, "pioneers": pioneers, "senses": senses,
-    "descriptions": descriptions,
+    "descriptions": descriptions, "trains": trains,
+    "declared": declared_of("robot_bench.direct", "robot_bench.direct.differential"),
 }  # fmt: skip
 test_what_robots_on_wires_do_is_what_was_approved = judge_of(__file__, TRACES)

@@ -26,9 +26,10 @@ from robot_bench.events.stream import EventStream
 from robot_bench.events.words import distinguishing_words, is_frequent, last_words, words_of
 from robot_bench.recording.client_view import OdometryPose, SipRanges
 from robot_bench.recording.disputed import body_note, decided_after, first_disputed
+from robot_bench.recording.divergence import differences, signal_of
 from robot_bench.recording.event_files import write_named_events
 from robot_bench.recording.run_record import RunRecord, record_of
-from robot_bench.recording.signals import grouped
+from robot_bench.recording.signals import grouped, levels_and_duties, motor_steps, pin_labels
 from robot_bench.recording.trace import TraceWriter
 from robot_bench.recording.transfers import CanTransfers, I2cTransfers, SpiTransfers
 from robot_bench.recording.variables import MOST_ROWS, VariableWriter, read_variables
@@ -38,6 +39,7 @@ from simbase.errors import P2osError
 from tests.robot_bench.recording.long_run import META, MORE, long_run
 from tests.robot_bench.recording.records import S
 from tests.tools.suite.approved import judge_of, refusal, said, tried
+from tests.tools.suite.declared import declared_of
 
 BLOCK = next(pack([Edges([(5, 1), (9, 0)]), Edges([(7, 1)]), Edges()], 9))
 BULK = [
@@ -166,6 +168,9 @@ def words(_draw: Random) -> Iterator[str]:
             else:
                 other = type(value)() if value else value
             yield said(distinguishing_words(event, replace(event, **{field.name: other})))
+            if isinstance(value, bytes | str | tuple):
+                empty: Any = type(value)()
+                yield tried(words_of, replace(event, **{field.name: empty}))
     yield said(last_words(events, 5))
     yield said(distinguishing_words(events[0], events[-1]))
 
@@ -381,6 +386,31 @@ def files(draw: Random) -> Iterator[str]:
                 yield f"{changed}: {tried(read_variables, Path(name))}".replace(name, "HERE")
 
 
+def signals(draw: Random) -> Iterator[str]:
+    """Read motors' pins as numbers, waves as duties, and where two runs part in each signal."""
+    yield said(pin_labels())
+    for bits in (0, 1, 2, 3, 4):
+        for motor in (1, 2):
+            names = [f"motor{motor}_comm{bit + 1}" for bit in range(bits)]
+            pins = {name: Edges([(0, draw.randrange(2)), *((draw.randrange(9) + 9 * n, n % 2) for n in (1, 2, 3))])
+                    for name in names}  # fmt: skip
+            found = motor_steps(pins, motor)
+            yield said([[*pins.items()], [*found], [*found[1:3]], len(found), found == [*found], found == found[1:]])
+    run = record(draw)
+    yield said([(net, levels_and_duties(run, net)) for net in run.pins])
+    events = every_kind()
+    yield said([(type(event).__name__, signal_of(event)) for event in events])
+    for _ in range(30):
+        one, other = [*events], [*events]
+        for rows in (one, other):
+            place = draw.randrange(len(rows))
+            if draw.random() < 0.5:
+                rows[place] = replace(rows[place], t=rows[place].t + draw.choice((1, S)))
+            else:
+                del rows[place]
+        yield said([(part.signal, part.at, part.one, part.other) for part in differences(one, other)])
+
+
 def disputes(draw: Random) -> Iterator[str]:
     """Touch a box and a post at all angles: after which contacts bodies differ."""
     box = {"name": "box", "shape": "box", "x": 1.0, "y": 0.0, "heading": 0.0, "length": 0.4, "width": 0.2}
@@ -411,5 +441,7 @@ TRACES: dict[str, Any] = {
     "views": views,
     "files": files,
     "disputes": disputes,
+    "signals": signals,
+    "declared": declared_of("robot_bench.events", "robot_bench.recording"),
 }
 test_what_becomes_of_events_is_what_was_approved = judge_of(__file__, TRACES)

@@ -31,7 +31,8 @@ from robot_bench.scenario.scenario import Scenario
 from simbase.errors import P2osError
 from simbase.timing import NS_PER_MS
 from tests.robot_bench.firmware.hurried import hurried
-from tests.tools.suite.approved import judge_of, said, tried
+from tests.tools.suite.approved import Trace, judge_of, said, tried
+from tests.tools.suite.declared import declared_of
 
 #: What it is walked through with; imported, so that it stands near these.
 PARTS = (Recorder, RunLoop, EventWait, Expectations, FarEnd, HandDrivenBody, Interventions, RobotRun)
@@ -322,5 +323,8 @@ def numbers(_draw: Random) -> Iterator[str]:
     yield said([made.master, made.numbers["master"]])
 
 
-TRACES = {"runs": runs, "together": together, "expectations": expectations, "folders": folders, "numbers": numbers}
+TRACES: dict[str, Trace] = {
+    "runs": runs, "together": together, "expectations": expectations, "folders": folders, "numbers": numbers,
+    "declared": declared_of("robot_bench", "robot_bench.bench", "robot_bench.running"),
+}  # fmt: skip
 test_what_short_runs_are_is_what_was_approved = judge_of(__file__, TRACES)

@@ -46,6 +46,7 @@ from robot_bench.scenario.wired_robots import find_own_robot, known_own_robots
 from robot_bench.scenario.world_script import WorldScript, load_changes, placed_things
 from simbase.errors import P2osError
 from tests.tools.suite.approved import judge_of, refusal, said, tried
+from tests.tools.suite.declared import declared_of
 
 #: Imported, so that it stands near these.
 PARTS = (PartTable, ScenarioOptions, MOST_ROBOTS)
@@ -796,5 +797,6 @@ def triggers(draw: Random) -> Iterator[str]:
 TRACES = {
     "settings": settings, "lines": lines, "included": included, "many": many, "options": options, "hands": hands,
     "scripts": scripts, "triggers": triggers,
+    "declared": declared_of("robot_bench.scenario", "robot_bench.scenario.hands"),
 }  # fmt: skip
 test_what_scenarios_say_is_what_was_approved = judge_of(__file__, TRACES)

@@ -37,7 +37,8 @@ from robot_bench.campaign.variants.shrinking.things import (
 from robot_bench.scenario.loading import shipped_file
 from simbase.errors import P2osError
 from tests.robot_bench.firmware.hurried import hurried
-from tests.tools.suite.approved import judge_of, refusal, said, tried
+from tests.tools.suite.approved import Trace, judge_of, refusal, said, tried
+from tests.tools.suite.declared import declared_of
 
 S = 10**9
 HEAD = """
@@ -306,7 +307,9 @@ def mutation(draw: Random) -> Iterator[str]:
             yield looked.result.text
 
 
-TRACES = {
+TRACES: dict[str, Trace] = {
     "lists": lists, "shrinking": shrinking, "outcomes": outcomes, "versions": versions, "mutation": mutation,
+    "declared": declared_of(*(f"robot_bench.campaign.{one}" for one in (
+        "variants", "variants.mutation", "variants.shrinking"))),
 }  # fmt: skip
 test_what_comes_of_variants_is_what_was_approved = judge_of(__file__, TRACES)

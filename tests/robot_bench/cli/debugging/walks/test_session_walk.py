@@ -19,7 +19,8 @@ from robot_bench.scenario.loading import load_scenario
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_MS
 from tests.robot_bench.running.test_run_control import Controlled, Listener, scenario
-from tests.tools.suite.approved import judge_of, said, tried
+from tests.tools.suite.approved import Trace, judge_of, said, tried
+from tests.tools.suite.declared import declared_of
 
 DURATION_S = 0.56
 #: Where slices are as long as a clock wants them, so are the stretches in which variables are seen.
@@ -212,5 +213,10 @@ def words(_draw: Random) -> Iterator[str]:
     yield said([drive_words((0.12345, -7.06)), trouble_of(UsageError("no", hint="yes")), trouble_of(UsageError("no"))])
 
 
-TRACES = {"page": page, "gdb": gdb, "words": words}
+TRACES: dict[str, Trace] = {
+    "page": page,
+    "gdb": gdb,
+    "words": words,
+    "declared": declared_of("robot_bench.cli.debugging"),
+}
 test_how_a_run_stands_is_what_was_approved = judge_of(__file__, TRACES)

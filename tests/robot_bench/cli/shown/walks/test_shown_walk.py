@@ -25,6 +25,7 @@ from robot_bench.cli.shown.targets import run_target, scenario_target
 from robot_bench.scenario.loading import load_scenario
 from tests.robot_bench.firmware.hurried import hurried_scenario
 from tests.tools.suite.approved import judge_of, said, tried
+from tests.tools.suite.declared import declared_of
 
 MS = 1_000_000
 GOAL = '[[goal]]\nkind = "min_distance"\ndistance_m = 1\n[start]\nx_m = 1\ny_m = 0\nheading_deg = 0\n'
@@ -236,5 +237,6 @@ def looks(_draw: Random) -> Iterator[str]:
 
 TRACES = {
     "panels": panels, "hands": hands, "live": live, "fleet": fleet, "fleet_hands": fleet_hands, "looks": looks,
+    "declared": declared_of("robot_bench.cli.shown"),
 }  # fmt: skip
 test_what_pages_are_shown_is_what_was_approved = judge_of(__file__, TRACES)

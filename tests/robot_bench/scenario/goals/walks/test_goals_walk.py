@@ -15,7 +15,8 @@ from robot_bench.scenario.goals.watch import given_in_words, window_in_words
 from simbase.errors import P2osError
 from tests.robot_bench.recording.records import S
 from tests.robot_bench.scenario.goals.test_goals_on_long_runs import GOALS
-from tests.tools.suite.approved import judge_of, refusal, said
+from tests.tools.suite.approved import Trace, judge_of, refusal, said
+from tests.tools.suite.declared import declared_of
 
 MS = S // 1000
 #: What values of goals are drawn from, by the ends of their names: the grid on which the runs lie.
@@ -192,5 +193,5 @@ def together(draw: Random) -> Iterator[str]:
     yield said([given_in_words((" a ", 1.5, " s"), (" b ", None, " s")), window_in_words("x", from_s=1, within_s=2)])
 
 
-TRACES = {"kinds": kinds, "together": together}
+TRACES: dict[str, Trace] = {"kinds": kinds, "together": together, "declared": declared_of("robot_bench.scenario.goals")}
 test_what_goals_say_of_small_runs_is_what_was_approved = judge_of(__file__, TRACES)

@@ -1,0 +1,134 @@
+"""What experiments measure of runs made by hand, and which runs they ask for, at random."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from random import Random
+
+from robot_bench.events.kinds import Contact
+from robot_bench.experiments.validation import experiments, trials
+from robot_bench.experiments.validation.encoders import (
+    count_figures,
+    encoder_figures,
+    slip_figures,
+    sparse_figures,
+    wrap_figure,
+)
+from robot_bench.experiments.validation.experiments import ExperimentTrial
+from robot_bench.experiments.validation.figures import (
+    Figure,
+    FigureTolerance,
+    Finding,
+    Missing,
+    loose,
+    shown_value,
+    worst,
+)
+from robot_bench.experiments.validation.motors import motor_figures
+from robot_bench.experiments.validation.sensors import only_while_seen_figures, reading_figures, sensor_figures
+from robot_bench.experiments.validation.silence import silence_figures
+from robot_bench.scenario.goals.judging import Judgement
+from robot_bench.scenario.scenario import Scenario
+from simbase.timing import NS_PER_S
+from tests.robot_bench.experiments.validation.test_validation_findings import MODES, MadeRun, nominal_of
+from tests.tools.suite.approved import Trace, judge_of, said, tried
+from tests.tools.suite.declared import declared_of
+
+
+def measures_of(
+    trial: ExperimentTrial, wanted: Sequence[tuple[tuple[int, int], float]], gates: Scenario
+) -> Sequence[Callable[[], Sequence[Finding]]]:
+    """Return all that can be measured of a run."""
+    record, nominal, scenario = trial.record, trial.nominal, trial.scenario
+    family = scenario.controller.family_of(scenario.parameters)
+    return (
+        lambda: motor_figures(record, nominal, wanted), lambda: encoder_figures(record, nominal),
+        lambda: count_figures(record), lambda: sparse_figures(record, nominal),
+        lambda: slip_figures(record, nominal, "kinematic"), lambda: slip_figures(record, nominal, "bullet"),
+        lambda: [wrap_figure(record, family)], lambda: sensor_figures(record, nominal, gates),
+        lambda: reading_figures(record, scenario), lambda: only_while_seen_figures(record, nominal),
+        lambda: silence_figures(record, nominal), lambda: experiments.drive_figures(trial),
+        lambda: experiments._drive_at_port(trial), lambda: experiments._long_drive(trial),
+    )  # fmt: skip
+
+
+def measured(measure: Callable[[], Sequence[Finding]]) -> Iterator[str]:
+    try:
+        for one in measure():
+            yield said(one)
+            if isinstance(one, Figure):
+                yield said([one.difference, one.share, one.is_met])
+    except (ValueError, LookupError, ZeroDivisionError) as error:
+        yield type(error).__name__
+
+
+def validations(draw: Random) -> Iterator[str]:
+    """Measure runs made by hand whose speeds, ramps, pins and packets are more or less off, in each mode."""
+    for number in range(12):
+        mode = MODES[number % 3]
+        nominal, scenario = nominal_of(mode)
+        legs = [((draw.randrange(-4, 4), draw.randrange(-4, 4)), draw.choice((0.2, 1.0, 2.0))) for _ in range(3)]
+        seen = []
+        for wire in draw.sample(range(1, 9), 3):
+            begin = draw.choice((0.5, 3.2, 3.5, 4.0))
+            seen.append((f"DD{wire}", begin, begin + draw.choice((0.01, 0.4, 1.0, 9.0))))
+        readings = sorted((draw.uniform(0.5, 5.0), draw.randrange(10), draw.choice((200, 3000))) for _ in range(9))
+        fault = draw.choice((None, (1.5, 3.5)))
+        record = MadeRun(nominal=nominal, legs=legs, late_s=draw.choice((0.0, 0.06, 0.3)), rest_s=2.0, fault=fault,
+                         fast=draw.choice((1.0, 1.01, 1.2)), steep=draw.choice((1.0, 1.3)), seen=seen,
+                         readings=readings).record()  # fmt: skip
+        record.contacts = [Contact(t=NS_PER_S, what="'box'", x_m=1.0, y_m=0.5, part="")] * draw.choice((0, 2))
+        record = draw.choice((record, record, replace(record, events=[]), replace(record, poses=record.poses[:9])))
+        gates = nominal_of("adapter", "sensors")[1] if number < 4 else scenario
+        wanted = [*legs, (legs[0][0], 0.1)] if draw.random() < 0.3 else legs
+        judgement = Judgement(["a"] * draw.randrange(3), ["b: x"] * draw.randrange(2), [])
+        trial = ExperimentTrial(record=record, nominal=nominal, scenario=scenario, judgement=judgement)
+        for measure in measures_of(trial, wanted, gates):
+            yield from measured(measure)
+
+
+def trials_asked(draw: Random) -> Iterator[str]:
+    """Choose experiments, variants, worlds and seeds, and say what their runs came to."""
+    for name, one in experiments.EXPERIMENTS.items():
+        at_port = one.at_port if isinstance(one.at_port, str) else [one.at_port.room, one.at_port.scenario]
+        yield said([name, one.hypothesis, one.procedure, one.scenario, one.worlds, one.seeds, one.settings, one.modes,
+                    at_port])  # fmt: skip
+        for load in (one.load, one.load_at_port):
+            yield tried(
+                lambda load=load: said([(found := load()).name, found.mode, found.duration_ns, len(found.goals)])
+            )
+    every = list(experiments.EXPERIMENTS.values())
+    for _ in range(12):
+        modes = draw.sample(("direct", "adapter", "port"), draw.randrange(3))
+        chosen = trials.variants(modes, draw.choice((["kinematic"], ["kinematic", "bullet"])))
+        yield said([modes, chosen, [variant.name for variant in chosen]])
+        some = draw.sample(every, 3)
+        seeds, worlds = draw.choice((None, [], [3, 4])), draw.choice(((), ("room",), ("none",)))
+        yield tried(trials.refuse, some, chosen, draw.choice(((), [("threshold_m", 0.5)], [("none", 1)])), worlds)
+        runs = list(trials._runs(some, chosen, seeds, worlds))
+        for run in runs[:9]:
+            yield said(
+                [[one.name for one in run.experiments], run.variant.name, run.world, run.seed, trials._where(run)]
+            )
+        if not runs:
+            continue
+        bound = FigureTolerance(name="b", value=draw.choice((0.0, 0.5)), formula="f")
+        found = tuple(
+            Figure(group="pins", what="w", expected=1.0, measured=draw.choice((1.0, 1.5, 2.25)), uncertainty=0.1,
+                   unit=draw.choice(("", "s")), bound=bound, at=draw.choice(("", "here")))
+            for _ in range(draw.randrange(3))
+        ) + (Missing(group="wire", what="m", why="y"),) * draw.randrange(2)  # fmt: skip
+        for result in trials._results(runs[0], draw.choice(({"failures": ["a", "b"]}, {"results": [
+            trials._result(some[0], runs[0], found, "sha")]}))):  # fmt: skip
+            yield said([result, result.passed, result.failures, trials.reported(result)])
+        ports = trials.port_runs(some)
+        rooms = [([one.name for one in port.experiments], port.room) for port in ports]
+        yield said([rooms, trials.longest_s(ports)])
+        yield said([trials._word(text) for text in ("a b", "a (b), c", "--", "x1")])
+        yield said([shown_value(1234567.0, "s"), shown_value(0.00001234, ""), loose([*found])])
+        yield tried(lambda found=found: said(worst([one for one in found if isinstance(one, Figure)])))
+
+
+TRACES: dict[str, Trace] = {
+    "validations": validations, "trials": trials_asked, "declared": declared_of("robot_bench.experiments.validation"),
+}  # fmt: skip
+test_what_validations_come_to_is_what_was_approved = judge_of(__file__, TRACES)
