@@ -108,7 +108,7 @@ def _restart(target: FaultTarget, fault: RobotFault, is_on: bool) -> None:
 
 _ACTS: Mapping[str, Act] = {
     **dict.fromkeys(("sonar-stuck", "sonar-noisy", "sonar-dead"), _sonar),
-    **dict.fromkeys(MOMENTARY, _restart),
+    **dict.fromkeys(sorted(MOMENTARY), _restart),
     "wheel-blocked": _wheel,
     "loose-connector": _connector,
     "line-noise": _noise,

@@ -35,7 +35,8 @@ from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import StandardSip
 from p2os.robots.parameters import load_parameters
 from tests.adapter_sim.conftest import PARAMETERS, PINOUT, PINOUT_TEXT, FakePins, FakeRobot, four_bits
-from tests.tools.suite.approved import Trace, declared_in, judge_of, said, tried
+from tests.tools.suite.approved import Trace, judge_of, said, tried
+from tests.tools.suite.declared import declared_of
 
 MS = 1_000_000
 
@@ -617,6 +618,6 @@ TRACES: dict[str, Trace] = {
     "settings": settings,
     "stops": stops,
     "sessions": sessions,
-    "declared": declared_in("adapter_sim"),
+    "declared": declared_of("adapter_sim"),
 }
 test_a_walk_shows_what_was_approved = judge_of(__file__, TRACES)

@@ -24,7 +24,8 @@ from hardware.pcb.layout.routing import Track, load_routes
 from hardware.pcb.outputs import generated_files
 from hardware.pcb.proof import board_file, expected, lands, mistakes, mutants, printed
 from hardware.pcb.spice import deck, decks, netlist, page, run
-from tests.tools.suite.approved import Trace, declared_in, judge_of, rounded, said, tried
+from tests.tools.suite.approved import Trace, judge_of, rounded, said, tried
+from tests.tools.suite.declared import declared_of
 
 PACKAGES = ("hardware.case", "hardware.pcb", *(f"hardware.pcb.{name}" for name in
             ("checks", "circuit", "layout", "outputs", "proof", "spice")))  # fmt: skip
@@ -225,5 +226,5 @@ def commands(draw: random.Random) -> Iterator[str]:
 
 
 TRACES: dict[str, Trace] = {each.__name__: each for each in (circuits, orders, slips, routes, simulations, commands)}
-TRACES["declared"] = declared_in(*PACKAGES)
+TRACES["declared"] = declared_of(*PACKAGES)
 test_what_was_approved_is_shown = judge_of(__file__, TRACES)

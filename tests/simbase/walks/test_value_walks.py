@@ -32,7 +32,8 @@ from simbase.units import (
     ranges_text,
 )
 from simbase.wire import are_fighting, level_of
-from tests.tools.suite.approved import Trace, declared_in, judge_of, refusal, said, tried
+from tests.tools.suite.approved import Trace, judge_of, refusal, said, tried
+from tests.tools.suite.declared import declared_of
 
 QUANTITIES = (LENGTH, ANGLE, SPEED, TURN_RATE, TIME, BAUD, FACTOR, PERCENT, COUNT, PORT)
 NUMBERS = (
@@ -314,5 +315,5 @@ def _shown(held: object) -> str:
 
 
 TRACES: dict[str, Trace] = {each.__name__: each for each in (quantities, words, first_bytes, states, kinds)}
-TRACES["declared"] = declared_in("simbase", "simbase.command_line", "simbase.trust")
+TRACES["declared"] = declared_of("simbase", "simbase.command_line", "simbase.trust")
 test_what_was_approved_is_shown = judge_of(__file__, TRACES)

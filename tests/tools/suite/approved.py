@@ -10,21 +10,16 @@ keeps the checksums. A change that is meant changes traces too: write them befor
 """
 
 import argparse
-import ast
 import importlib
-import inspect
 import json
-import pkgutil
 import random
 import re
 import sys
 import zlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from collections.abc import Set as AbstractSet
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from pathlib import Path
-from types import FunctionType, ModuleType
 
 import pytest
 
@@ -77,124 +72,6 @@ def refusal(error: Exception) -> str:
             words = words.replace(part, "…") if len(part) > SHORTEST else words
     hint = getattr(error, "hint", None)
     return f"{words} ({hint})" if hint else words
-
-
-def figures_of(package: str) -> Trace:
-    """Return the trace of a package's figures: each number and text that a module of it names, whoever uses it."""
-
-    def figures(_draw: random.Random) -> Iterable[str]:
-        root = importlib.import_module(package)
-        for found in sorted(pkgutil.iter_modules(root.__path__), key=lambda one: one.name):
-            module = importlib.import_module(f"{package}.{found.name}")
-            for name in _assigned(inspect.getsource(module)):
-                if _is_figure(value := getattr(module, name, None)):
-                    yield f"{found.name} {name} {said(value)}"
-
-    return figures
-
-
-def declared_in(*packages: str) -> Trace:
-    """Return the trace of what packages declare: tables, members of enumerations, and the values that calls may omit.
-
-    Left out is what differs between machines: places of files, functions and other objects.
-    """
-
-    def declared(_draw: random.Random) -> Iterable[str]:
-        for package in packages:
-            root = importlib.import_module(package)
-            for found in sorted(pkgutil.iter_modules(root.__path__), key=lambda one: one.name):
-                if not found.ispkg and found.name != "__main__":
-                    yield from _declarations(importlib.import_module(f"{package}.{found.name}"))
-
-    return declared
-
-
-def _declarations(module: ModuleType) -> Iterable[str]:
-    source = inspect.getsource(module)
-    empty = _empty(source)
-    for name in _assigned(source):
-        value = getattr(module, name, None)
-        if is_table(value) and not (name in empty and isinstance(value, dict | list | set)):
-            yield f"{module.__name__} {name} {said(in_order(value))}"
-    for name, value in sorted(vars(module).items()):
-        if getattr(value, "__module__", None) != module.__name__:
-            continue
-        if isinstance(value, type) and issubclass(value, Enum):
-            members = [(one.name, in_order(one.value)) for one in value if is_table(one.value)]
-            yield f"{module.__name__} {name} {said(members)}"
-        owned = vars(value).items() if isinstance(value, type) else [("", value)]
-        omitted = [(own, *rows) for own, each in owned if (rows := _omitted(each, module.__name__))]
-        if is_table(defaults := getattr(value, "_field_defaults", {})) and defaults:  # of a named tuple
-            omitted.append(("", *defaults.items()))
-        if omitted:
-            yield f"{module.__name__} {name} {said(omitted)}"
-
-
-def _omitted(call: object, module: str) -> list[tuple[str, object]]:
-    """Return the parameters of a function or method that a call may leave out, with what they are then."""
-    call = call.__func__ if isinstance(call, classmethod | staticmethod) else call
-    if not isinstance(call, FunctionType) or call.__module__ != module:
-        return []
-    given = {name: one.default for name, one in inspect.signature(call).parameters.items()}
-    return [
-        (name, in_order(value))
-        for name, value in given.items()
-        if value is not inspect.Parameter.empty and is_table(value)
-    ]
-
-
-def is_table(value: object) -> bool:
-    """Tell whether a value is made of numbers, words and tables alone."""
-    if isinstance(value, tuple | list | AbstractSet):
-        return all(map(is_table, value))
-    if isinstance(value, Mapping):
-        return all(map(is_table, value.values())) and all(map(is_table, value))
-    if isinstance(value, str):
-        return not value.startswith("/") and " at 0x" not in value
-    if is_dataclass(value) and not isinstance(value, type):
-        return all(is_table(getattr(value, part.name)) for part in fields(value))
-    return value is None or isinstance(value, int | float | bytes | Enum)
-
-
-def in_order(value: object) -> object:
-    """Return a table with each set in it as its members in order, for a set has none that stays."""
-    if isinstance(value, AbstractSet):
-        return sorted(map(said, value))
-    if isinstance(value, Mapping):
-        return {key: in_order(each) for key, each in value.items()}
-    if isinstance(value, Enum):
-        return value.name or value.value  # several flags at once have no name
-    return [*map(in_order, value)] if isinstance(value, tuple | list) else value
-
-
-def _assigned(source: str) -> list[str]:
-    """Return the names in capitals that a module itself gives values to."""
-    rows = [row for row in ast.parse(source).body if isinstance(row, ast.Assign | ast.AnnAssign)]
-    targets = [target for row in rows for target in (row.targets if isinstance(row, ast.Assign) else [row.target])]
-    names = [one.id for target in targets for one in ast.walk(target) if isinstance(one, ast.Name)]
-    return [name for name in names if name.isupper()]
-
-
-def _empty(source: str) -> set[str]:
-    """Return the names to which a module gives what is empty: a cache, which holds what has run before."""
-    rows = [row for row in ast.parse(source).body if isinstance(row, ast.AnnAssign | ast.Assign)]
-    return {
-        target.id
-        for row in rows
-        for target in (row.targets if isinstance(row, ast.Assign) else [row.target])
-        if isinstance(target, ast.Name)
-        and (
-            (isinstance(row.value, ast.Call) and not row.value.args and not row.value.keywords)
-            or (isinstance(row.value, ast.Dict) and not row.value.keys)
-            or (isinstance(row.value, ast.List) and not row.value.elts)
-        )
-    }
-
-
-def _is_figure(value: object) -> bool:
-    if isinstance(value, tuple):
-        return all(map(_is_figure, value))
-    return isinstance(value, int | float | str | bytes)
 
 
 def judge_of(file: str, traces: Mapping[str, Trace]) -> Callable[..., None]:

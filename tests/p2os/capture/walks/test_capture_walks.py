@@ -36,7 +36,8 @@ from p2os.view.recording import ViewRecording
 from simbase.timing import NS_PER_MS
 from tests.p2os.capture.blocks import blocks_of
 from tests.p2os.capture.network_files import ETHERNET, network_file, segment
-from tests.tools.suite.approved import Trace, declared_in, judge_of, said, tried
+from tests.tools.suite.approved import Trace, judge_of, said, tried
+from tests.tools.suite.declared import declared_of
 
 GOLDEN = Path(__file__).resolve().parents[3] / "golden"
 VECTORS = [bytes.fromhex(str(row["hex"])) for row in json.loads((GOLDEN / "p2os_vectors.json").read_text())]
@@ -167,5 +168,5 @@ def replays(draw: random.Random) -> Iterator[str]:
 
 
 TRACES: dict[str, Trace] = {each.__name__: each for each in (vectors, sessions, formats, tables, views, replays)}
-TRACES["declared"] = declared_in("p2os.capture", "p2os.capture.columns", "p2os.capture.formats")
+TRACES["declared"] = declared_of("p2os.capture", "p2os.capture.columns", "p2os.capture.formats")
 test_what_was_approved_is_shown = judge_of(__file__, TRACES)

@@ -42,7 +42,8 @@ from p2os.view.run_control import DRIVE_HOLD_NS, RunCommand
 from simbase.errors import P2osError
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 from tests.p2os.cli.robots.test_dashboard import STATE
-from tests.tools.suite.approved import Trace, declared_in, judge_of, said, tried
+from tests.tools.suite.approved import Trace, judge_of, said, tried
+from tests.tools.suite.declared import declared_of
 
 C = CommandNumber
 SIP = packet_frame(StandardSip(raw_x=5), Profile.P2OS).to_bytes()
@@ -487,7 +488,7 @@ def lists(draw: random.Random) -> Iterator[str]:
 
 
 TRACES: dict[str, Trace] = {each.__name__: each for each in (sniffed, files, pages, keys, pads, browsers, lists)}
-TRACES["declared"] = declared_in(
+TRACES["declared"] = declared_of(
     "p2os.cli", "p2os.cli.captures", "p2os.cli.links", "p2os.cli.robots", "p2os.cli.virtual"
 )
 test_what_was_approved_is_shown = judge_of(__file__, TRACES)

@@ -18,7 +18,8 @@ from p2os.protocol.sip import StandardSip
 from p2os.robots.parameters import load_parameters
 from simbase.timing import NS_PER_MS
 from tests.tools.suite.acted import Acted, taken
-from tests.tools.suite.approved import Trace, declared_in, judge_of, said, tried
+from tests.tools.suite.approved import Trace, judge_of, said, tried
+from tests.tools.suite.declared import declared_of
 
 MS = NS_PER_MS
 #: A span of time after which something may be due, one nanosecond before it and one behind it.
@@ -230,5 +231,5 @@ def _asked(draw: random.Random, mover: Mover, goals: list[MotionGoal], limits: o
 
 
 TRACES: dict[str, Trace] = {each.__name__: each for each in (keeping, switching, doubting, aiming, moving)}
-TRACES["declared"] = declared_in("p2os.client")
+TRACES["declared"] = declared_of("p2os.client")
 test_what_was_approved_is_shown = judge_of(__file__, TRACES)

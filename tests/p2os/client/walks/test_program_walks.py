@@ -40,7 +40,7 @@ from p2os.transport.waiting import wait_readable
 from simbase.errors import P2osError
 from simbase.timing import NS_PER_MS, NS_PER_S
 from tests.p2os.client.client_rig import free_pioneer
-from tests.tools.suite.approved import Trace, figures_of, judge_of, refusal, said, tried
+from tests.tools.suite.approved import Trace, judge_of, refusal, said, tried
 
 MS = NS_PER_MS
 NAME = Identity(name="Rob", robot_class="Pioneer", subclass="p2dx")
@@ -674,5 +674,4 @@ def lines(draw: random.Random) -> Iterator[str]:
 TRACES: dict[str, Trace] = {
     each.__name__: each for each in (usual, careful, blind, bare, awaited, peers, parts, aux_bytes, observed, lines)
 }
-TRACES["figures"] = figures_of("p2os.client")
 test_what_was_approved_is_shown = judge_of(__file__, TRACES)

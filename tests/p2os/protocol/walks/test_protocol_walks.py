@@ -32,7 +32,8 @@ from p2os.protocol.sip import SonarReading, StandardSip
 from p2os.robots.parameters import load_parameters
 from simbase.timing import NS_PER_MS
 from tests.p2os.protocol.drawn_packets import KINDS, Draw, any_packet, any_sip
-from tests.tools.suite.approved import Trace, declared_in, judge_of, said, tried
+from tests.tools.suite.approved import Trace, judge_of, said, tried
+from tests.tools.suite.declared import declared_of
 
 C = CommandNumber
 WILMA = Identity("Wilma", "Pioneer", "p2dx")
@@ -448,5 +449,5 @@ TRACES: dict[str, Trace] = {
     each.__name__: each
     for each in (rows, orders, streams, packets, settings_of_robots, counters, clients, opened, servers)
 }
-TRACES["declared"] = declared_in("p2os.protocol", "p2os.protocol.packets")
+TRACES["declared"] = declared_of("p2os.protocol", "p2os.protocol.packets")
 test_what_was_approved_is_shown = judge_of(__file__, TRACES)

@@ -16,7 +16,8 @@ from p2os.toml_schema import Key, Kind, TablePlace, filled, within
 from simbase.errors import FileError
 from simbase.timing import NS_PER_MS
 from tests.p2os.robots.test_robot_files import MINE
-from tests.tools.suite.approved import Trace, declared_in, judge_of, said, tried
+from tests.tools.suite.approved import Trace, judge_of, said, tried
+from tests.tools.suite.declared import declared_of
 
 P2DX = files("p2os.robots").joinpath("p2dx.toml").read_text(encoding="utf-8")
 PROPERTIES = [name for name, value in vars(model.RobotParameters).items() if isinstance(value, property)]
@@ -121,5 +122,5 @@ def pads(draw: random.Random) -> Iterator[str]:
 
 
 TRACES: dict[str, Trace] = {each.__name__: each for each in (robots, robot_files, values, texts, pads)}
-TRACES["declared"] = declared_in("p2os", "p2os.robots")
+TRACES["declared"] = declared_of("p2os", "p2os.robots")
 test_what_was_approved_is_shown = judge_of(__file__, TRACES)

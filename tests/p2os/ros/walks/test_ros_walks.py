@@ -37,7 +37,8 @@ from simbase.errors import UsageError
 from simbase.timing import NS_PER_MS, NS_PER_S
 from tests.p2os.ros.spoken_types import SPOKEN
 from tests.tools.suite.acted import Acted, taken
-from tests.tools.suite.approved import Trace, declared_in, figures_of, judge_of, rounded, said, tried
+from tests.tools.suite.approved import Trace, judge_of, rounded, said, tried
+from tests.tools.suite.declared import declared_of
 
 LASER = LaserModel(start_deg=-20, end_deg=20, step_cdeg=1000, range_m=8.0, nearest_m=0.1)
 OPTIONS = (NodeOptions(), NodeOptions(namespace="/r1/a", name="n", domain=7))
@@ -497,6 +498,5 @@ def open_bag(path: Path) -> Any:
 TRACES: dict[str, Trace] = {
     each.__name__: each for each in (nodes, values, bytes_of_messages, zenoh_names, over_zenoh, over_dds, bag_files)
 }
-TRACES["figures"] = figures_of("p2os.ros")
-TRACES["declared"] = declared_in("p2os.ros")
+TRACES["declared"] = declared_of("p2os.ros")
 test_what_was_approved_is_shown = judge_of(__file__, TRACES)

@@ -32,7 +32,8 @@ from simbase.errors import P2osError
 from simbase.listening import WebClientError
 from simbase.timing import NS_PER_MS, NS_PER_S
 from tests.tools.suite.acted import Acted, taken
-from tests.tools.suite.approved import Trace, declared_in, figures_of, judge_of, said, tried
+from tests.tools.suite.approved import Trace, judge_of, said, tried
+from tests.tools.suite.declared import declared_of
 
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux", reason="numbers of options, and words of failures, are Linux's"
@@ -434,6 +435,5 @@ TRACES: dict[str, Trace] = {
     each.__name__: each
     for each in (urls, connections, places, serial_ports, terminals, waits, closing_lines, times, addresses)
 }
-TRACES["figures"] = figures_of("p2os.transport")
-TRACES["declared"] = declared_in("p2os.transport")
+TRACES["declared"] = declared_of("p2os.transport")
 test_what_was_approved_is_shown = judge_of(__file__, TRACES)

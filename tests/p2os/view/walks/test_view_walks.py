@@ -55,7 +55,8 @@ from p2os.view.server.page_session import PageSession, RequestError
 from p2os.view.watched_line import WatchedConversation, WatchedLine, WatchedListener
 from p2os.view.world_plan import world_of
 from tests.tools.suite.acted import Acted, taken
-from tests.tools.suite.approved import Trace, declared_in, figures_of, judge_of, said, tried
+from tests.tools.suite.approved import Trace, judge_of, said, tried
+from tests.tools.suite.declared import declared_of
 
 CAPTURE = Path(__file__).resolve().parents[3] / "golden" / "captures" / "ros_p2dx.jsonl"
 P2DX = load_parameters("p2dx")
@@ -659,7 +660,5 @@ TRACES: dict[str, Trace] = {
         frames, spans, tracks, sessions, commands, access, pages, servers, conversations, watched, documents,
     )
 }  # fmt: skip
-TRACES["figures"] = figures_of("p2os.view")
-TRACES["figures of the server"] = figures_of("p2os.view.server")
-TRACES["declared"] = declared_in("p2os.view", "p2os.view.server")
+TRACES["declared"] = declared_of("p2os.view", "p2os.view.server")
 test_what_was_approved_is_shown = judge_of(__file__, TRACES)

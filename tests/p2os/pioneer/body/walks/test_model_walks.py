@@ -29,7 +29,8 @@ from simbase.errors import P2osError
 from tests.p2os.pioneer.body.outside.served import Served, served
 from tests.p2os.pioneer.body.walks.test_engine_walks import FAN, MESH, RAMP, THINGS
 from tests.p2os.pioneer.world.walks.things import drawn_thing
-from tests.tools.suite.approved import Trace, declared_in, judge_of, refusal, said, tried
+from tests.tools.suite.approved import Trace, judge_of, refusal, said, tried
+from tests.tools.suite.declared import declared_of
 
 MODELS = tuple(map(load_parameters, ("p2dx", "p3at", "amigo-sh", "patrolbot-sh", "seekur")))
 #: What of a model of MuJoCo says what a world was made of; of meshes places and turns are the engine's own.
@@ -370,7 +371,7 @@ TRACES: dict[str, Trace] = {
     **({"motors": motors} if find_spec("pybullet") else {}),
     **{each.__name__: each for each in (givens, wire, asked)},
 }
-TRACES["declared"] = declared_in(
+TRACES["declared"] = declared_of(
     "p2os.pioneer.body", "p2os.pioneer.body.bullet", "p2os.pioneer.body.mujoco", "p2os.pioneer.body.outside"
 )
 test_what_was_approved_is_shown = judge_of(__file__, TRACES)

@@ -29,7 +29,8 @@ from p2os.protocol.commands import CommandNumber as C
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import load_parameters
 from simbase.timing import NS_PER_MS
-from tests.tools.suite.approved import Trace, declared_in, figures_of, judge_of, said, tried
+from tests.tools.suite.approved import Trace, judge_of, said, tried
+from tests.tools.suite.declared import declared_of
 
 LASER = LaserModel(start_deg=-20, end_deg=20, step_cdeg=200, range_m=8.0)
 #: What moves the robot, and is said more often than the rest.
@@ -344,6 +345,5 @@ def ramps(draw: random.Random) -> Iterator[str]:  # noqa: C901, PLR0912 - a tabl
 TRACES: dict[str, Trace] = {
     each.__name__: each for each in (plain, erring, simulated, crowded, bumped, kinds, tables, ramps)
 }
-TRACES["figures"] = figures_of("p2os.pioneer.controller")
-TRACES["declared"] = declared_in("p2os.pioneer.controller")
+TRACES["declared"] = declared_of("p2os.pioneer.controller")
 test_what_was_approved_is_shown = judge_of(__file__, TRACES)

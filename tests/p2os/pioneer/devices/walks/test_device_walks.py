@@ -23,7 +23,8 @@ from p2os.pioneer.sonar.schedule import SonarSchedule, raw_range
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import load_parameters
 from simbase.timing import NS_PER_MS, NS_PER_S
-from tests.tools.suite.approved import Trace, declared_in, judge_of, said, tried
+from tests.tools.suite.approved import Trace, judge_of, said, tried
+from tests.tools.suite.declared import declared_of
 
 AROUND = (-1, 0, 1)
 
@@ -284,5 +285,5 @@ TRACES: dict[str, Trace] = {
     each.__name__: each
     for each in (gripper, lasers, headings, pins, batteries, ports, schedules, pings, ranges, errors)
 }
-TRACES["declared"] = declared_in("p2os.pioneer", "p2os.pioneer.devices", "p2os.pioneer.sonar")
+TRACES["declared"] = declared_of("p2os.pioneer", "p2os.pioneer.devices", "p2os.pioneer.sonar")
 test_what_was_approved_is_shown = judge_of(__file__, TRACES)

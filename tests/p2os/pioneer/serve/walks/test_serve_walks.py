@@ -35,7 +35,8 @@ from p2os.protocol.profiles import Profile
 from p2os.transport import HungUpError, Listener, Loops, Transport, listen_url
 from simbase.timing import NS_PER_MS, NS_PER_S
 from tests.tools.suite.acted import Acted, taken
-from tests.tools.suite.approved import Trace, declared_in, figures_of, judge_of, rounded, said, tried
+from tests.tools.suite.approved import Trace, judge_of, rounded, said, tried
+from tests.tools.suite.declared import declared_of
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are Unix's")
 
@@ -638,6 +639,5 @@ TRACES: dict[str, Trace] = {
         background, afterwards,
     )
 }  # fmt: skip
-TRACES["figures"] = figures_of("p2os.pioneer.serve")
-TRACES["declared"] = declared_in("p2os.pioneer.serve")
+TRACES["declared"] = declared_of("p2os.pioneer.serve")
 test_what_was_approved_is_shown = judge_of(__file__, TRACES)

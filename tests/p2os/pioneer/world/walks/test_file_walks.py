@@ -21,7 +21,8 @@ from tests.p2os.pioneer.world import test_importers_maps as maps
 from tests.p2os.pioneer.world import test_importers_meshes as meshes
 from tests.p2os.pioneer.world import test_importers_xml as xml
 from tests.p2os.pioneer.world.walks.things import drawn_world
-from tests.tools.suite.approved import Trace, declared_in, judge_of, refusal, rounded, said, tried
+from tests.tools.suite.approved import Trace, judge_of, refusal, rounded, said, tried
+from tests.tools.suite.declared import declared_of
 
 _NUMBER = re.compile(r"(?<![\w#.])-?\d+(?:\.\d+)?(?![\w.])")
 NUMBERS = ("0", "1", "-1", "2", "0.5", "3", "1000", "1e9", "90", "x", "")
@@ -171,5 +172,5 @@ TRACES: dict[str, Trace] = {
     **({"occupancy": walk_of("map.yaml", maps.YAML, 24)} if find_spec("PIL") and find_spec("yaml") else {}),
     **{each.__name__: each for each in (worlds, exported, polygons, transforms)},
 }
-TRACES["declared"] = declared_in("p2os.pioneer.export")
+TRACES["declared"] = declared_of("p2os.pioneer.export")
 test_what_was_approved_is_shown = judge_of(__file__, TRACES)

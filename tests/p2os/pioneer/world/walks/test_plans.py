@@ -14,7 +14,8 @@ from p2os.pioneer.world.start_places import floor_height, start_places
 from p2os.pioneer.world.writer import write_world
 from p2os.robots.parameters import load_parameters
 from tests.p2os.pioneer.world.walks.things import drawn_mesh, drawn_thing, drawn_walk, drawn_world
-from tests.tools.suite.approved import Trace, declared_in, judge_of, rounded, said, tried
+from tests.tools.suite.approved import Trace, judge_of, rounded, said, tried
+from tests.tools.suite.declared import declared_of
 
 P2DX, PATROLBOT = load_parameters("p2dx"), load_parameters("patrolbot-sh")
 
@@ -145,7 +146,7 @@ TRACES: dict[str, Trace] = {
     each.__name__: each
     for each in (makers, shipped, meshes, joins, walks, things, footprints, plans, pictures, placings)
 }
-TRACES["declared"] = declared_in(
+TRACES["declared"] = declared_of(
     "p2os.pioneer.world",
     "p2os.pioneer.world.formats",
     "p2os.pioneer.world.formats.meshes",
