@@ -165,8 +165,6 @@ class Drive:
     #: Speeds of the rims, m/s: by the body where it is known, else by the packets.
     left_mps: Steps | None = None
     right_mps: Steps | None = None
-    #: Whether those are the body's own.
-    has_true_wheels: bool = False
     #: The rims' speeds by the packets.
     reported_left_mps: Steps | None = None
     reported_right_mps: Steps | None = None

@@ -54,7 +54,6 @@ def drive_of_record(called: str, record: RunRecord, robot: str = "") -> Drive:
         drive.truth = trajectory_of(record.poses)
         drive.left_mps = steps_of([(pose.t / NS_PER_S, pose.left / 1e6) for pose in record.poses])
         drive.right_mps = steps_of([(pose.t / NS_PER_S, pose.right / 1e6) for pose in record.poses])
-        drive.has_true_wheels = True
     if not drive.sonar_m:
         drive.sonar_m = _sonar_of(record)
     drive.motors = {

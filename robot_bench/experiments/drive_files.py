@@ -152,7 +152,7 @@ def _of_csv(path: Path, robot: str) -> Drive:
     is_reported = "dir" in names and "type" in names
     drive = Drive(
         name=path.name, parameters=_parameters(robot), odometry=trajectory if is_reported else None,
-        truth=None if is_reported else trajectory, has_true_wheels=not is_reported,
+        truth=None if is_reported else trajectory,
         sonar_m={number: steps_of(column(name)) for number, name in sonar.items()},
     )  # fmt: skip
     if "left_mps" in names and "right_mps" in names:

@@ -124,11 +124,6 @@ def _kind(outcome: Outcome) -> Hashable:
     return goals, outcome.died.partition(" at ")[0], part
 
 
-def obstacle_cells(trial: Trial) -> _Cells:
-    """Return the cells that the things of a trial cover, those of its world and those that are placed later."""
-    return _scene(trial)[1]
-
-
 def way_cells(outcome: Outcome, extent: Sequence[float]) -> _Cells:
     """Return the cells that the robot went through, on straight lines between the places that are known."""
     found: set[Hashable] = set()

@@ -78,12 +78,6 @@ class DriveTrain(Stateful):
     def currents_a(self, currents_a: tuple[float, float]) -> None:
         self.struct.left_a, self.struct.right_a = currents_a
 
-    @property
-    def kinetic_j(self) -> float:
-        """The energy of all that moves."""
-        left, right = self.left_radps, self.right_radps
-        return (self.own * (left**2 + right**2)) / 2 + self.other * left * right
-
     def supply_v(self, left: Shares, right: Shares, source_v: float, source_ohm: float, idle_a: float) -> float:
         """Return the supply's volts at the speeds of now, where its source has a resistance."""
         given = _given(left), _given(right)

@@ -239,17 +239,13 @@ class _NotLong(Watch):
         elif isinstance(event, Pose):
             self._since = (self._since or event) if self.is_bad(event) else None
             if self._since is not None and (lasted := event.t - self._since.t) > self._longest:
-                was_long, self._longest, self._longest_at = self._is_long, lasted, self._since
-                return self.finish(event.t) if self._is_long and not was_long else None
+                before, self._longest, self._longest_at = self._longest, lasted, self._since
+                return self.finish(event.t) if before <= self._within_s * NS_PER_S < lasted else None
         return None
-
-    @property
-    def _is_long(self) -> bool:
-        return self._longest > self._within_s * NS_PER_S
 
     def finish(self, end: Nanos) -> GoalOutcome:
         by = 1 - self._longest / NS_PER_S / self._within_s
-        if not self._is_long or self._longest_at is None:
+        if self._longest <= self._within_s * NS_PER_S or self._longest_at is None:
             return GoalOutcome(met=True, robustness=by, unit=ALLOWED)
         says = f"for {self._longest / NS_PER_S:.2f} s from {_place(self._longest_at)}, {self.words}"
         return GoalOutcome(met=False, says=f"{says}; {self._within_s:g} s are allowed", robustness=by, unit=ALLOWED)
@@ -297,18 +293,15 @@ class NoIdleTurn(_NotLong):
         self._free_mm, self._apart_um = 1000 * table.free_m, table.apart_m * MICRO
         self._long_rad = math.radians(table.long_deg)
         self._last: Pose | None = None
-        #: Where the last turn ended, and whether it went back since it last went forward.
-        self._ended: Pose | None = None
-        self._goes_back = False
-        #: Of the turn that goes on: whether it may be a long one, and by how much it has turned, radians.
-        self._is_long_due = False
+        self._ended: Pose | None = None  # where the last turn did
+        #: Whether it last went back; of the turn that goes on, whether it may be long, and how far it is, radians.
+        self._goes_back = self._is_long_due = False
         self._turned: float | None = None
 
     def is_bad(self, pose: Pose) -> bool:
         last, self._last = self._last, pose
         if not _spins(pose):
-            if self._turned is not None:
-                self._ended, self._turned = last, None
+            self._ended, self._turned = last if self._turned is not None else self._ended, None
             if abs(pose.speed_mps) > DRIVES_MPS:
                 self._goes_back = pose.speed_mps < 0
             return False
@@ -316,14 +309,12 @@ class NoIdleTurn(_NotLong):
             self._turned, self._is_long_due = 0.0, self._may_be_long(pose)
         else:
             self._turned += math.remainder(pose.heading_rad - last.heading_rad, math.tau)
-        if self._is_long_due and abs(self._turned) < self._long_rad:
-            return False
-        return self._ranges is not None and min(self._ranges.mm, default=0) > self._free_mm
+        is_judged = not self._is_long_due or abs(self._turned) >= self._long_rad
+        return is_judged and self._ranges is not None and min(self._ranges.mm, default=0) > self._free_mm
 
     def _may_be_long(self, pose: Pose) -> bool:
         """Tell whether a turn that begins here is soon after another, after going back, or between two things."""
-        ended = self._ended
-        if self._goes_back or (ended and math.hypot(pose.x - ended.x, pose.y - ended.y) < self._apart_um):
+        if self._goes_back or ((at := self._ended) and math.hypot(pose.x - at.x, pose.y - at.y) < self._apart_um):
             return True
         mm = self._ranges.mm if self._ranges is not None else ()
         return all(any(one <= len(mm) and mm[one - 1] <= self._free_mm for one in side) for side in (LEFT, RIGHT))

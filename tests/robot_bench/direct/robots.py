@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from robot_bench.direct.differential.description import Differential
+from robot_bench.direct.differential.drive_train import DriveTrain
 from robot_bench.scenario.wired_robots import load_own_robot
 
 ROVER = Path(str(files("robot_bench.direct").joinpath("robots", "rover.toml")))
@@ -16,3 +17,9 @@ def rover(**parts: dict[str, object]) -> Differential:
     robot = cast("Differential", load_own_robot(ROVER, {}, "").robot)
     changed: dict[str, Any] = {name: replace(getattr(robot, name), **values) for name, values in parts.items()}
     return replace(robot, **changed)
+
+
+def kinetic_j(train: DriveTrain) -> float:
+    """Return the energy of all that moves."""
+    left, right = train.left_radps, train.right_radps
+    return (train.own * (left**2 + right**2)) / 2 + train.other * left * right

@@ -4,7 +4,7 @@ import pytest
 
 from robot_bench.direct.differential.bridge import Shares
 from robot_bench.direct.differential.drive_train import DriveTrain, box_inertia, no_load_radps
-from tests.robot_bench.direct.robots import rover
+from tests.robot_bench.direct.robots import kinetic_j, rover
 from tests.robot_bench.recording.kept_lines import is_as_kept
 
 STAGES = [
@@ -34,7 +34,7 @@ def test_a_train_through_its_stages() -> None:
                 lines += [shown(supply, *(value for aim in train.aims(left, right, supply) for value in aim))]
                 for _ in range(40):
                     done = train.step(left, right, supply)
-                lines += [shown(*done, train.left_radps, train.right_radps, train.kinetic_j)]
+                lines += [shown(*done, train.left_radps, train.right_radps, kinetic_j(train))]
     assert is_as_kept(lines, "train_whole")
 
 

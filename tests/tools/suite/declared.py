@@ -17,6 +17,7 @@ from contextlib import suppress
 from dataclasses import MISSING, Field, fields, is_dataclass
 from enum import Enum
 from functools import partial
+from itertools import islice
 from pathlib import Path
 from types import FunctionType, ModuleType
 
@@ -63,9 +64,8 @@ class _Shown:
             if isinstance(row, ast.Assign | ast.AnnAssign):
                 targets = row.targets if isinstance(row, ast.Assign) else [row.target]
                 found = [one.id for target in targets for one in ast.walk(target) if isinstance(one, ast.Name)]
-                values = {name: "empty" if _is_empty(row.value) else self.value(names[name])
-                          for name in found if name in names and name != "__all__"}  # fmt: skip
-                yield from (f"{name}: {value}" for name, value in values.items())
+                yield from (f"{name}: {self.value(_begun(names[name], row.value))}"
+                            for name in found if name in names and name != "__all__")  # fmt: skip
             elif isinstance(row, ast.FunctionDef | ast.AsyncFunctionDef) and row.name in names:
                 has_defaults = row.args.defaults or any(row.args.kw_defaults)
                 if has_defaults or hasattr(names[row.name], "cache_parameters"):
@@ -145,12 +145,12 @@ class _Shown:
         return f"{each.name}: {default}{made} {' '.join(name for name in _WAYS if getattr(each, name))}"
 
 
-def _is_empty(value: ast.expr | None) -> bool:
-    """Tell whether a name is given what is empty: what it keeps later depends on what has run before."""
-    if isinstance(value, ast.Call):
-        return not value.args and not value.keywords and ast.unparse(value.func).partition("[")[0] in _EMPTY
-    return (isinstance(value, ast.Dict) and not value.keys) or (isinstance(value, ast.List) and not value.elts)
-
-
-#: What makes something empty.
-_EMPTY = {"dict", "list", "set", "deque", "Counter", "WeakKeyDictionary", "WeakValueDictionary", "WeakSet"}
+def _begun(value: object, written: ast.expr | None) -> object:
+    """Return a table with the rows alone that are written down: some are added to while programs run."""
+    if isinstance(written, ast.Call) and not written.args and not written.keywords:
+        return () if isinstance(value, dict | list | set) else value
+    if isinstance(written, ast.List) and not written.elts:
+        return ()
+    if isinstance(value, dict) and isinstance(written, ast.Dict) and None not in written.keys:
+        return dict(islice(value.items(), len(written.keys)))
+    return value

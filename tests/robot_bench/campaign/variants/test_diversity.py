@@ -9,11 +9,11 @@ from robot_bench.campaign.trial import GoalResult, HullContact, Outcome, Trial, 
 from robot_bench.campaign.variants.diversity import (
     CELLS,
     SAME_PATH,
+    _scene,
     clusters,
     distance,
     diversity,
     mean_distance,
-    obstacle_cells,
     way_cells,
 )
 from tests.robot_bench.firmware.hurried import hurried
@@ -78,14 +78,14 @@ def test_the_same_world_twice_has_no_diversity_and_posts_elsewhere_have_all_of_i
 
 
 def test_a_post_moved_within_its_cells_is_the_same_and_one_moved_out_is_not() -> None:
-    assert obstacle_cells(with_posts((1.0, 0.1))) == obstacle_cells(with_posts((1.001, 0.1)))
-    assert obstacle_cells(with_posts((1.0, 0.1))) != obstacle_cells(with_posts((1.4, 0.1)))
+    assert _scene(with_posts((1.0, 0.1)))[1] == _scene(with_posts((1.001, 0.1)))[1]
+    assert _scene(with_posts((1.0, 0.1)))[1] != _scene(with_posts((1.4, 0.1)))[1]
 
 
 def test_a_thing_before_a_sensor_is_the_same_thing_wherever_the_robot_is() -> None:
     posts = [{"name": "post", "shape": "cylinder", "radius_m": 0.1, "height_m": 0.5, "at_s": 0.0, "distance_m": 0.5}]
     trials = [with_posts().with_lists(obstacle=[{**posts[0], "before_sonar": n}]) for n in (3, 3, 4)]
-    cells = [obstacle_cells(trial) for trial in trials]
+    cells = [_scene(trial)[1] for trial in trials]
     assert cells[0] == cells[1] != cells[2]
 
 

@@ -26,7 +26,7 @@ from robot_bench.direct.differential.robot import DifferentialRobot
 from robot_bench.direct.differential.robot_file import TABLES, load_differential
 from robot_bench.direct.senses import WorldSenses
 from robot_bench.wires.nets import Net, Strength, WaveDrive
-from tests.robot_bench.direct.robots import ROVER, rover
+from tests.robot_bench.direct.robots import ROVER, kinetic_j, rover
 from tests.robot_bench.direct.test_differential import MS, Rig
 from tests.robot_bench.direct.test_direct import nets, set_value
 from tests.tools.suite.approved import judge_of, said, tried
@@ -109,7 +109,7 @@ def trains(draw: Random) -> Iterator[str]:
             else:
                 made = train.step(left, right, volts)
             cell.give(draw.choice((0.0, 3.0, -1.0)), draw.choice((1.0, 900.0)))
-            yield exact(volts, *aims, *made, *train.currents_a, train.left_radps, train.right_radps, train.kinetic_j,
+            yield exact(volts, *aims, *made, *train.currents_a, train.left_radps, train.right_radps, kinetic_j(train),
                         cell.used_ah, cell.source_v)  # fmt: skip
 
 
@@ -146,7 +146,7 @@ def robots(draw: Random) -> Iterator[str]:
                 rig.robot.advance_to(at)
             state, train, cell = rig.body.state, rig.robot.train, rig.robot.cell
             shown = [state.x_m, state.y_m, state.heading_rad, train.left_radps, train.right_radps, *train.currents_a,
-                     train.kinetic_j, cell.volts, 1e3 * cell.used_ah, *rig.robot.next_setpoints()]  # fmt: skip
+                     kinetic_j(train), cell.volts, 1e3 * cell.used_ah, *rig.robot.next_setpoints()]  # fmt: skip
             levels = "".join(str(int(net.level(now + 20 * MS))) for net in rig.harness)
             edges = [len(rig.harness[f"{side}_{one}"].edges_until(now + 20 * MS)) for side in ("left", "right")
                      for one in "ab"]  # fmt: skip

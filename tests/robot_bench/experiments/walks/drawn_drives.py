@@ -35,7 +35,7 @@ def of_way(way: Trajectory | None) -> str:
 
 
 def of_drive(drive: Drive) -> Iterator[str]:
-    yield f"{drive.name} {drive.parameters.track_mm} {drive.has_true_wheels} {drive.open_goals} {drive.meta}"
+    yield f"{drive.name} {drive.parameters.track_mm} {drive.open_goals} {drive.meta}"
     yield f"odometry {of_way(drive.odometry)} truth {of_way(drive.truth)}"
     for side in (drive.left_mps, drive.right_mps, drive.reported_left_mps, drive.reported_right_mps):
         yield of_steps(side)

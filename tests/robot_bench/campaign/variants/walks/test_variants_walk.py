@@ -221,7 +221,7 @@ def versions(draw: Random) -> Iterator[str]:
     yield said([diversity.mean_distance(sets), diversity.mean_distance(sets[:1]), diversity.distance(sets[0], sets[1])])
     with TemporaryDirectory(prefix="p2os-test-") as name:
         mine = trial(Path(name))
-        yield said(sorted(map(str, diversity.obstacle_cells(mine))))
+        yield said(sorted(map(str, diversity._scene(mine)[1])))
         other = Other("b.elf", b"else")
         other.keep(Path(name))
         yield said([Other.of(Path(name)), Other.of(Path(name, "none")), other.sha256[:9]])
