@@ -212,7 +212,7 @@ def set_key(table: dict[str, object], key: str, value: object) -> tuple[str, int
     """
     held, name, number = table, "", 0
     *path, last = key.split(".")
-    if (first := [*path, last][0]) in NAMING:
+    if (first := key.partition(".")[0]) in NAMING:
         raise UsageError(f"--set {key}: files are named in the scenario's own file",
                          hint=f'a file of your own with {first} = "..."')  # fmt: skip
     while path:

@@ -60,12 +60,10 @@ class DriveTrain(Stateful):
         wheel = motor.rotor_inertia_kg_m2 * gear**2 + body.wheel_mass_kg * radius**2 / 2
         both = wheel + body.mass_kg * radius**2 / 2
         apart = wheel + 2 * robot.yaw_inertia_kg_m2 * radius**2 / robot.track_m**2
-        #: The wheels' inertia, and that by which one moves the other, kg·m².
-        self.own, self.other = (both + apart) / 2, (both - apart) / 2
         self.struct = TrainStruct(
             dt_s, motor.resistance_ohm + robot.bridge.resistance_ohm, robot.bridge.drop_v,
             motor.torque_constant_nm_a * gear, motor.friction_nm * gear, motor.damping_nm_s * gear**2,
-            self.own, self.other,
+            (both + apart) / 2, (both - apart) / 2,  # the wheels' inertia, and that by which one moves the other, kg·m²
         )  # fmt: skip
         self.address = ctypes.addressof(self.struct)
 

@@ -66,6 +66,12 @@ def _spins(pose: Pose) -> bool:
     return abs(pose.speed_mps) <= DRIVES_MPS and abs(_difference_mps(pose)) >= SPINS_MPS
 
 
+def _nearest_mm(ranges: Ranges | None, side: tuple[int, ...]) -> float:
+    """Return the least range of the sonar on a side; infinity where none is known."""
+    mm = ranges.mm if ranges is not None else ()
+    return min((mm[one - 1] for one in side if one <= len(mm)), default=math.inf)
+
+
 class _Sides:
     """What stands near on one side only."""
 
@@ -75,11 +81,7 @@ class _Sides:
 
     def nearer(self, ranges: Ranges | None) -> int:
         """Return the side on which something is near while the other is free: 1 left, -1 right, 0 neither or both."""
-        if ranges is None:
-            return 0
-        left_mm, right_mm = (
-            min((ranges.mm[one - 1] for one in side if one <= len(ranges.mm)), default=math.inf) for side in self._sides
-        )
+        left_mm, right_mm = (_nearest_mm(ranges, side) for side in self._sides)
         if left_mm < self._near_mm and right_mm > self._free_mm:
             return 1
         return -1 if right_mm < self._near_mm and left_mm > self._free_mm else 0
@@ -316,8 +318,7 @@ class NoIdleTurn(_NotLong):
         """Tell whether a turn that begins here is soon after another, after going back, or between two things."""
         if self._goes_back or ((at := self._ended) and math.hypot(pose.x - at.x, pose.y - at.y) < self._apart_um):
             return True
-        mm = self._ranges.mm if self._ranges is not None else ()
-        return all(any(one <= len(mm) and mm[one - 1] <= self._free_mm for one in side) for side in (LEFT, RIGHT))
+        return all(_nearest_mm(self._ranges, side) <= self._free_mm for side in (LEFT, RIGHT))
 
 
 class BacksOnPathTable(Record):

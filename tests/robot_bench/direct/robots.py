@@ -22,4 +22,4 @@ def rover(**parts: dict[str, object]) -> Differential:
 def kinetic_j(train: DriveTrain) -> float:
     """Return the energy of all that moves."""
     left, right = train.left_radps, train.right_radps
-    return (train.own * (left**2 + right**2)) / 2 + train.other * left * right
+    return float((train.struct.own * (left**2 + right**2)) / 2 + train.struct.other * left * right)

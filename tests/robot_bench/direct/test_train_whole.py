@@ -27,7 +27,7 @@ def test_a_train_through_its_stages() -> None:
     ]
     for parts in changes:
         train = DriveTrain(rover(**parts), 1e-3)
-        lines += [f"{parts} {shown(train.own, train.other)}"]
+        lines += [f"{parts} {shown(train.struct.own, train.struct.other)}"]
         for left, right in STAGES:
             for volts in (7.4, 0.5):
                 supply = train.supply_v(left, right, volts, 0.3, 0.1)

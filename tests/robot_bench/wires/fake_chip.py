@@ -4,9 +4,10 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from types import SimpleNamespace
 
-from bluepill_sim.fabric.pins import PinDrive
+from bluepill_sim.fabric.pins import PinBank, PinDrive
 from bluepill_sim.fabric.subscriptions import EDGE, EdgeSink, Of
-from simbase.timing import Reached, Reason
+from simbase.timing import NS_PER_S, Reached, Reason
+from tests.bluepill_sim.fabric.test_waves import Ports
 
 
 @dataclass(frozen=True)
@@ -180,3 +181,21 @@ class FakeChip:
         self.now_ns, self._done, pins = snapshot  # type: ignore[misc]
         for name, outside, is_weak in pins:
             self.pin(name).outside, self.pin(name).is_weak = outside, is_weak
+
+
+class PortsChip(Ports):
+    """A bank of pins with a clock of nanoseconds, as the wires see a chip."""
+
+    def __init__(self, *names: str) -> None:
+        super().__init__()
+        self.pins = PinBank(self, frozenset(names))  # type: ignore[arg-type]  # a part of a chip
+        self.pins.fabric.set_time(0, 0, NS_PER_S)
+        self.pin = self.pins.__getitem__
+        self.subscribe_pins = self.pins.subscribe_pins
+
+    def run(self, until_ns: int) -> None:
+        while (due := self.pins.fabric.next_ns) is not None and due <= until_ns:
+            self.now_ns = max(due, self.now_ns)
+            self.pins.fabric.run_events(self.now_ns)
+        self.now_ns = until_ns
+        self.pins.deliver()

@@ -6,13 +6,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bluepill_sim.fabric.pins import PinBank, PinMode
+from bluepill_sim.fabric.pins import PinMode
 from bluepill_sim.fabric.subscriptions import Wave
 from p2os.errors import LocalProtocolError
 from robot_bench.wires.chip_pins import ChipPins
 from robot_bench.wires.nets import Contention, Harness, Net, Strength, WaveDrive
 from simbase.timing import NS_PER_S
-from tests.bluepill_sim.fabric.test_waves import Ports
+from tests.robot_bench.wires.fake_chip import PortsChip
 
 QUICK = settings(max_examples=60)
 PP, PULL = Strength.PUSH_PULL, Strength.PULL
@@ -21,27 +21,9 @@ WAVE = Wave(ns=0, at=0, period=3600, high=900, ticks_hz=72_000_000)
 DRIVE = WaveDrive(WAVE, PP.codes)
 
 
-class Chip(Ports):
-    """A bank of pins with a clock of nanoseconds, as the wires see a chip."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.pins = PinBank(self, frozenset({"PA0", "PA1"}))  # type: ignore[arg-type]  # a part of a chip
-        self.pins.fabric.set_time(0, 0, NS_PER_S)
-        self.pins["PA0"].configure(PinMode.ALTERNATE_PUSH_PULL, output_bit=False)
-        self.pin = self.pins.__getitem__
-        self.subscribe_pins = self.pins.subscribe_pins
-
-    def run(self, until_ns: int) -> None:
-        while (due := self.pins.fabric.next_ns) is not None and due <= until_ns:
-            self.now_ns = max(due, self.now_ns)
-            self.pins.fabric.run_events(self.now_ns)
-        self.now_ns = until_ns
-        self.pins.deliver()
-
-
-def joined() -> tuple[Chip, Net, ChipPins]:
-    chip, harness = Chip(), Harness([Net("pwm"), Net("in")])
+def joined() -> tuple[PortsChip, Net, ChipPins]:
+    chip, harness = PortsChip("PA0", "PA1"), Harness([Net("pwm"), Net("in")])
+    chip.pins["PA0"].configure(PinMode.ALTERNATE_PUSH_PULL, output_bit=False)
     return chip, harness["pwm"], ChipPins(chip, harness, {"pwm": "PA0", "in": "PA1"})  # type: ignore[arg-type]
 
 

@@ -90,6 +90,16 @@ def judge_of(file: str, traces: Mapping[str, Trace]) -> Callable[..., None]:
     return judged
 
 
+def judge_alike(file: str, names: Iterable[str]) -> Callable[[], None]:
+    """Return the test that some traces of a file are approved as the same."""
+
+    def judged() -> None:
+        approved = _approved(Path(file))
+        assert len({tuple(approved[name]) for name in names}) == 1
+
+    return judged
+
+
 def _hint(file: str) -> str:
     return f"(hint: `python -m tests.tools.suite.approved {Path(file).name} --write FOLDER` at both commits, `diff -u`)"
 

@@ -4,19 +4,17 @@ A loop is a block: it loads what counts, computes with it, and goes round by som
 once (`polling.c`) is what going round gives: where the core stands then, when, and with what in its registers.
 """
 
-import json
 import random
 import zlib
 from collections.abc import Iterator
 from functools import partial
-from pathlib import Path
 
 from bluepill_sim.core import Reg
 from bluepill_sim.core.unicorn_core import GENERAL
 from bluepill_sim.extension.library import core_chosen
 from bluepill_sim.native.engine import NativeEngine
 from tests.bluepill_sim.machine import COUNTER_ON, Machine
-from tests.tools.suite.approved import judge_of
+from tests.tools.suite.approved import judge_alike, judge_of
 
 LOOPS = 90
 #: The cores that go from block to block, and so show the same.
@@ -91,8 +89,4 @@ def _walk(core: str, _: random.Random, *, shows_rows: bool = False) -> Iterator[
 
 TRACES = {core: partial(_walk, core) for core in (*CORES, "exact")} | {"rows": partial(_walk, "own", shows_rows=True)}
 test_a_walk_shows_what_was_approved = judge_of(__file__, TRACES)
-
-
-def test_cores_that_go_from_block_to_block_show_the_same() -> None:
-    approved = json.loads(Path(__file__).with_name("approved.json").read_text(encoding="utf-8"))[Path(__file__).stem]
-    assert len({approved[core] for core in CORES}) == 1
+test_cores_that_go_from_block_to_block_show_the_same = judge_alike(__file__, CORES)

@@ -4,11 +4,9 @@ FPB, DWT and DEMCR are written between slices, as firmware does, and a debugger 
 the core looks out for, which code is remapped, what halted it, and all that decides what comes next.
 """
 
-import json
 import random
 from collections.abc import Iterator
 from functools import cache, partial
-from pathlib import Path
 
 from bluepill_sim import BluePill
 from bluepill_sim.core import Reg, Watchpoint
@@ -21,7 +19,7 @@ from tests.bluepill_sim.core.thumb_streams import SCRATCH
 from tests.bluepill_sim.core.walks import test_program_walks
 from tests.bluepill_sim.core.walks.programs import CODE_AT, NOTES, ROOM, assembled
 from tests.bluepill_sim.machine import STACK
-from tests.tools.suite.approved import judge_of, said
+from tests.tools.suite.approved import judge_alike, judge_of, said
 
 PROGRAMS, SLICES, SPANS_NS = 7, 24, (125, 1_000, 6_000, 25_000)
 CORES = ("native", "python")
@@ -126,8 +124,4 @@ def _episodes(core: str, _: random.Random) -> Iterator[str]:
 
 TRACES = {core: partial(_episodes, core) for core in CORES}
 test_a_walk_shows_what_was_approved = judge_of(__file__, TRACES)
-
-
-def test_both_cores_show_the_same() -> None:
-    approved = json.loads(Path(__file__).with_name("approved.json").read_text(encoding="utf-8"))[Path(__file__).stem]
-    assert len({approved[core] for core in CORES}) == 1
+test_both_cores_show_the_same = judge_alike(__file__, CORES)

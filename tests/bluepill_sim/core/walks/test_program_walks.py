@@ -1,14 +1,12 @@
 """Programs at random, which all cores run alike, against traces that were approved: registers, exceptions, time."""
 
 import ctypes
-import json
 import random
 import zlib
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from functools import cache, partial
-from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
@@ -21,7 +19,7 @@ from bluepill_sim.native import engine
 from bluepill_sim.program.image import Image
 from tests.bluepill_sim.core.walks.programs import assembled
 from tests.bluepill_sim.machine import STACK, listen
-from tests.tools.suite.approved import judge_of
+from tests.tools.suite.approved import judge_alike, judge_of
 
 PROGRAMS, SLICES = 30, 40
 #: Programs of which it is counted, too, what C leaves to Python.
@@ -160,8 +158,4 @@ TRACES = {core: partial(_episodes, core) for core in (*CORES, "exact")} | {
     f"{core} asked": partial(_asked, core) for core in ("native", "own")
 }
 test_a_walk_shows_what_was_approved = judge_of(__file__, TRACES)
-
-
-def test_cores_that_go_from_block_to_block_show_the_same() -> None:
-    approved = json.loads(Path(__file__).with_name("approved.json").read_text(encoding="utf-8"))[Path(__file__).stem]
-    assert len({approved[core] for core in CORES}) == 1
+test_cores_that_go_from_block_to_block_show_the_same = judge_alike(__file__, CORES)

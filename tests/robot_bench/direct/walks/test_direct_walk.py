@@ -94,7 +94,7 @@ def trains(draw: Random) -> Iterator[str]:
     )  # fmt: skip
     for changes in parts:
         train, cell = DriveTrain(rover(**changes), 1e-3), DischargingBattery(rover().battery)
-        yield exact(train.own, train.other)
+        yield exact(train.struct.own, train.struct.other)
         for _ in range(60):
             left, right = (Shares(*draw.choice((
                 (0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (0.3, 0.1, 0.6), (0.02, 0, 0), (0, 0.05, 0.9)

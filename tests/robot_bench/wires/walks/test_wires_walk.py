@@ -10,7 +10,7 @@ from pathlib import Path
 from random import Random
 
 from adapter_sim.pinout import load_pinout
-from bluepill_sim.fabric.pins import PinBank, PinMode
+from bluepill_sim.fabric.pins import PinMode
 from bluepill_sim.fabric.subscriptions import EDGE, Wave
 from robot_bench.wires.board_test.circuit import BoardFault, Circuit, Side, VoltageSource, WireFault
 from robot_bench.wires.board_test.ends import AdapterEnd, BluePillEnd
@@ -24,7 +24,7 @@ from robot_bench.wires.power_up import power_up
 from robot_bench.wires.serial_line import SerialLine
 from robot_bench.wires.waves import edge_times
 from simbase.timing import NS_PER_S, Reached
-from tests.bluepill_sim.fabric.test_waves import Ports
+from tests.robot_bench.wires.fake_chip import PortsChip
 from tests.tools.suite.acted import Acted, taken
 from tests.tools.suite.approved import Trace, judge_of, said, tried
 from tests.tools.suite.declared import declared_of
@@ -144,29 +144,12 @@ def waves(draw: Random) -> Iterator[str]:
             yield said([[*edge_times(wave, found[0] + by, found[-1] + to)][:9] for by, to in product((0, 1), (0, 1))])
 
 
-class Chip(Ports):
-    """A bank of pins with a clock of nanoseconds, as the wires see a chip."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.pins = PinBank(self, frozenset({"PA0", "PA1", "PB2"}))  # type: ignore[arg-type]  # a part of a chip
-        self.pins.fabric.set_time(0, 0, NS_PER_S)
-        self.pin = self.pins.__getitem__
-        self.subscribe_pins = self.pins.subscribe_pins
-
-    def run(self, until_ns: int) -> None:
-        while (due := self.pins.fabric.next_ns) is not None and due <= until_ns:
-            self.now_ns = max(due, self.now_ns)
-            self.pins.fabric.run_events(self.now_ns)
-        self.now_ns = until_ns
-        self.pins.deliver()
-
-
 def pins(draw: Random) -> Iterator[str]:
     """Drive a chip's pins from both sides, at their time and ahead of it, with some of them watched."""
     modes = (PinMode.PUSH_PULL, PinMode.FLOATING, PinMode.OPEN_DRAIN, PinMode.PULLED, PinMode.ALTERNATE_PUSH_PULL)
     for _ in range(10):
-        chip, harness, edges = Chip(), Harness([Net("a"), Net("b", idle=True), Net("c")]), list[int]()
+        chip, edges = PortsChip("PA0", "PA1", "PB2"), list[int]()
+        harness = Harness([Net("a"), Net("b", idle=True), Net("c")])
         for net in harness:
             if draw.random() < 0.4:
                 net.drive("board", draw.random() < 0.5, Strength.PULL, 0)
