@@ -174,10 +174,17 @@ def test_every_fault_that_was_put_down_stands_in_its_file() -> None:
     assert len(changes.planted(rows)) == len(rows) >= 10
 
 
+def in_functions(path: str) -> list[int]:
+    """Return lines of a file that only a call runs."""
+    lines = (ROOT / path).read_text(encoding="utf-8").splitlines()
+    return [number for number, text in enumerate(lines, 1) if text.startswith("        return ")]
+
+
 @pytest.mark.slow  # reads what every file of tests imports
 def test_the_nearest_tests_are_those_of_the_mirror_then_those_that_ran_the_line() -> None:
     by_name = Nearest(ROOT, {})
-    assert by_name.of("p2os/client/link.py", 1)[0] == "tests/p2os/client/test_link.py"
+    inside, below, last = in_functions("p2os/client/link.py")[:3]
+    assert by_name.of("p2os/client/link.py", inside)[0] == "tests/p2os/client/test_link.py"
     assert by_name.of("adapter_fw/core/app/text.cpp", 1)[0].startswith("tests/adapter_fw/")
     walk, beside = by_name.of("bluepill_sim/extension/source/devices/tim.c", 1)[:2]
     assert walk == "tests/bluepill_sim/peripherals/walks/test_tim_walks.py"
@@ -187,14 +194,18 @@ def test_the_nearest_tests_are_those_of_the_mirror_then_those_that_ran_the_line(
     in_order = by_name.of("bluepill_sim/extension/source/interpreter/lower.c", 1)
     assert in_order[0].startswith("tests/bluepill_sim/core/")
     # What is loaded by a name is imported by nobody: what walks the folder above it, then who has its folder's name.
-    walks, *others = by_name.of("p2os/pioneer/body/mujoco/model.py", 1)
+    model = "p2os/pioneer/body/mujoco/model.py"
+    walks, *others = by_name.of(model, in_functions(model)[0])
     assert walks.startswith("tests/p2os/pioneer/body/walks/")
     assert "tests/p2os/pioneer/body/test_body_mujoco.py" in others[:5]
-    ran = {"tests/whole/test_plugins.py": frozenset({7}), "tests/p2os/client/test_link.py": frozenset({8, 9})}
+    ran = {
+        "tests/whole/test_plugins.py": frozenset({inside}),
+        "tests/p2os/client/test_link.py": frozenset({below, last}),
+    }
     counted = Nearest(ROOT, {"p2os/client/link.py": ran})
-    for line, first in ((7, "tests/whole/test_plugins.py"), (8, "tests/p2os/client/test_link.py")):
+    for line, first in ((inside, "tests/whole/test_plugins.py"), (below, "tests/p2os/client/test_link.py")):
         found = counted.of("p2os/client/link.py", line)
-        rest = [name for name in by_name.of("p2os/client/link.py", 1) if name != first]
+        rest = [name for name in by_name.of("p2os/client/link.py", inside) if name != first]
         assert found[0] == first
         assert [*found[1:]] == rest[:4]
     # Run by an import: who imports it may look at what it has made, and run no line of it.
@@ -233,6 +244,29 @@ def test_near_to_a_file_that_no_test_names_is_who_tests_what_it_imports(tmp_path
     nearest = Nearest(tmp_path, {})
     assert nearest.of("pack/verbs/check.py", 2) == ("tests/pack/test_other.py", "tests/pack/test_one.py")
     assert nearest.of("pack/verbs/gone.py", 1) == ()
+
+
+def test_what_modules_declare_is_asked_first_about_a_line_outside_functions(tmp_path: Path) -> None:
+    code = "LIMIT = 3\n\n\ndef held(\n    most: int = LIMIT,\n) -> int:\n    return most\n"
+    shows = "from tests.tools.suite.declared import declared_of\n"
+    files = {
+        "pack/verbs/check.py": code,
+        "tests/pack/verbs/test_check.py": "from pack.verbs import check\n",
+        "tests/pack/verbs/test_near.py": f"{shows}TRACE = declared_of(f'{{0}}')\n",
+        "tests/pack/test_named.py": f'{shows}TRACE = declared_of("pack.verbs")\n',
+        "tests/pack/test_third.py": shows,
+        "tests/other/verbs/test_else.py": f'{shows}TRACE = declared_of("pack.verbs")\n',
+    }
+    for name, text in files.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    nearest = Nearest(tmp_path, {})
+    own = "tests/pack/verbs/test_check.py"
+    for line in (1, 4, 5, 6):
+        assert nearest.of("pack/verbs/check.py", line) == (
+            "tests/pack/test_named.py", "tests/pack/verbs/test_near.py", own,
+        ), line  # fmt: skip
+    assert nearest.of("pack/verbs/check.py", 7) == (own,)
 
 
 def test_the_nearest_tests_come_first_but_for_one_that_takes_much_longer() -> None:

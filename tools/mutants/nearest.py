@@ -20,6 +20,9 @@ UNKNOWN_S, LEAST_S = 1.0, 0.2
 SELDOM = 1.5
 #: A word in the names of files of tests that hold all that a module does at once: they are asked first.
 WHOLE = "walks"
+#: What a file of tests imports that shows what modules declare, and how many of these are asked first about a line
+#: outside functions.
+DECLARED, OF_DECLARED = "tests.tools.suite.declared", 2
 #: What tests a library in C or C++, by the folder of its sources or by a file: there are no imports to read.
 TESTS_OF_C = {
     # What is made of declarations is held to them as text.
@@ -111,7 +114,10 @@ class Nearest:
 
     def of(self, path: str, line: int) -> tuple[str, ...]:
         """Return the files of tests nearest to a line, at most `MOST_FILES`."""
-        return self._of_python(path, line) if path.endswith(".py") else self._of_c(path)
+        if not path.endswith(".py"):
+            return self._of_c(path)
+        first = self._of_declared(path) if line not in _in_functions(self._root / path) else []
+        return tuple(dict.fromkeys((*first, *self._of_python(path, line))))[:MOST_FILES]
 
     def made_of(self, test: str) -> tuple[str, ...]:
         """Return what a file of tests says by: itself, what of its own folder it imports, and the data beside it."""
@@ -137,6 +143,16 @@ class Nearest:
         known = [*near, *others][: MOST_FILES - NOT_COUNTED]
         # What was written since the suite was counted is known by its imports alone.
         return (*known, *[name for name in by_name if name not in known][:NOT_COUNTED])
+
+    def _of_declared(self, path: str) -> list[str]:
+        """Return who shows what modules declare, of the nearest packages."""
+        folder = path.rpartition("/")[0]
+        shown = [name for name in self._tests if DECLARED in self._imports[name]]
+        near = [name for name in shown if name.split("/")[1] == path.partition("/")[0]]
+        asked = f'"{folder.replace("/", ".")}"'
+        names_it = {name: asked in (self._root / name).read_text(encoding="utf-8") for name in near}
+        mirror = f"tests/{folder}"
+        return sorted(near, key=lambda name: (not names_it[name], _apart(mirror, _folder(name)), name))[:OF_DECLARED]
 
     def _by_name(self, path: str) -> list[str]:
         module = path.removesuffix("/__init__.py").removesuffix(".py").replace("/", ".")
@@ -224,6 +240,14 @@ def counted_lines(folder: Path, root: Path) -> Counted:
                     of_source = found.setdefault(Path(source).relative_to(root).as_posix(), {})
                     of_source[test] = of_source.get(test, frozenset()) | frozenset(lines)
     return found
+
+
+@cache
+def _in_functions(path: Path) -> frozenset[int]:
+    """Return the lines of a module that run when a function is called: of what stands before its body, none."""
+    nodes = ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if path.exists() else ()
+    made = [each for each in nodes if isinstance(each, ast.FunctionDef | ast.AsyncFunctionDef)]
+    return frozenset(line for each in made for line in range(each.body[0].lineno, (each.end_lineno or 0) + 1))
 
 
 def _ordered(distances: Mapping[str, tuple[int, ...] | None]) -> list[str]:
