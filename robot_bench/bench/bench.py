@@ -403,5 +403,4 @@ def _built_anew(saved_by: str, recipe: bytes) -> Bench:
 
 def _recorder(snapshot: object) -> dict[str, object]:
     """Return the part of a bench's snapshot that says where its trace stands."""
-    bench = cast("dict[str, dict[str, dict[str, object]]]", snapshot)
-    return bench["recorder"]["trace"]
+    return cast("dict[str, dict[str, dict[str, object]]]", snapshot)["recorder"]["trace"]

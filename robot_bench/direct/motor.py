@@ -34,7 +34,7 @@ class JointMotor(Stateful):
     """
 
     STATE = ("speed_um_per_s", "asked", "_duties")
-    DERIVED = ("_is_known",)
+    DERIVED = ("is_known",)
 
     def __init__(
         self,
@@ -56,8 +56,8 @@ class JointMotor(Stateful):
             self._change, rest = divmod(ramp_um_per_s2 * dt_ns, NS_PER_S)
             if rest or self._change <= 0:
                 raise LocalProtocolError(f"a ramp of {ramp_um_per_s2} µm/s² is no whole number of µm/s in {dt_ns} ns")
-        #: Whether `asked` is the value of all drives that the wires have had.
-        self._is_known = False
+        #: Whether `asked` is the value of all drives that the wires have had: it stays while nobody drives them anew.
+        self.is_known = False
         for net in self._nets:
             net.watch(self._note_drive)
         self.speed_um_per_s = 0
@@ -82,14 +82,14 @@ class JointMotor(Stateful):
     @property
     def is_steady(self) -> bool:
         """Tell whether all later steps have the speed of the last one, unless somebody drives the wires anew."""
-        return self._is_known and self.speed_um_per_s == self._wanted
+        return self.is_known and self.speed_um_per_s == self._wanted
 
     def step(self, at: Nanos) -> int:
         """Return the rim speed in µm/s for the step of the body that starts at `at`."""
-        if not self._is_known:
+        if not self.is_known:
             self.asked = self.value(at)
             # A duty that has changed shows behind its last edge.
-            self._is_known = not self._duties and all(net.last_edge <= at for net in self._nets)
+            self.is_known = not self._duties and all(net.last_edge <= at for net in self._nets)
         wanted = self._wanted
         if self._change is None:
             self.speed_um_per_s = wanted
@@ -106,7 +106,7 @@ class JointMotor(Stateful):
         return self.asked * self._step_um_per_s
 
     def _note_drive(self, _net: Net, _owner: str, _at: Nanos) -> None:
-        self._is_known = False
+        self.is_known = False
 
     def _restored(self) -> None:
-        self._is_known = False
+        self.is_known = False

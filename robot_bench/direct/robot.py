@@ -118,28 +118,31 @@ class DirectRobot(Stateful):
 
     def _step_to(self, limit: Nanos) -> None:
         """Make every step that ends by then, and set the encoders' wires at each of their instants by then."""
-        body, left, right = self.body, self._left, self._right
-        dt_ns, wanted = body.dt_ns, limit // body.dt_ns
+        dt_ns, wanted = self.body.dt_ns, limit // self.body.dt_ns
         while self._steps < wanted:
-            speeds = self.next_setpoints()
-            alike = wanted - self._steps if left.is_steady and right.is_steady else 1
-            made = body.hold(*speeds, alike)
-            while (at := self._next_encoder) <= (self._steps + alike) * dt_ns:
-                ended = at // dt_ns - self._steps
-                self._show_encoders(made[ended - 1] if ended else self._wheels, at)
-            self._wheels = made[-1]
-            self._steps += alike
+            made = (self._wheels, *self._steps_made(wanted - self._steps))
+            while (at := self._next_encoder) <= (self._steps + len(made) - 1) * dt_ns:
+                self._show_encoders(made[at // dt_ns - self._steps], at)
+            self._wheels, self._steps = made[-1], self._steps + len(made) - 1
         while self._next_encoder <= limit:
             self._show_encoders(self._wheels, self._next_encoder)
 
-    def next_setpoints(self) -> tuple[float, float]:
-        """Return the rim-speed set-points of the body's next step, m/s; for who steps it together with others, too."""
-        start = self._steps * self.body.dt_ns
-        left, right = self._left, self._right
-        speeds = left.step(start) / UM_PER_M, right.step(start) / UM_PER_M
-        if (left.asked, right.asked) != self._asked:
-            self._asked = (left.asked, right.asked)
-            self._tell(start, "command", f"motors {left.asked}, {right.asked}")
+    def _steps_made(self, most: int) -> Sequence[Wheels]:
+        """Make up to so many steps in which the wires say the same; return the wheels after each."""
+        setpoints = [self.next_setpoints()]
+        if self._left.is_steady and self._right.is_steady:
+            return self.body.hold(*setpoints[0], most)
+        while len(setpoints) < most and self._left.is_known and self._right.is_known:
+            setpoints.append(self.next_setpoints(len(setpoints)))
+        return self.body.ramp(setpoints)
+
+    def next_setpoints(self, later: int = 0) -> tuple[float, float]:
+        """Return the rim-speed set-points of the next step, m/s, or of one so many steps later, each asked for once."""
+        start = (self._steps + later) * self.body.dt_ns
+        speeds = self._left.step(start) / UM_PER_M, self._right.step(start) / UM_PER_M
+        if (self._left.asked, self._right.asked) != self._asked:
+            self._asked = self._left.asked, self._right.asked
+            self._tell(start, "command", f"motors {self._asked[0]}, {self._asked[1]}")
         return speeds
 
     def take_step(self, wheels: Wheels) -> None:

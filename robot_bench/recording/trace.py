@@ -159,8 +159,7 @@ class TraceWriter(Stateful):
         self.flush()
         if self.path is None:
             self._file.seek(begin)
-            rest = self._file.read()
-            yield from io.StringIO(rest)
+            yield from io.StringIO(self._file.read())
             return
         try:
             with self.path.open(encoding="utf-8", errors="replace") as lines:

@@ -13,6 +13,8 @@ from p2os.pioneer.world.geometry import INFINITY, Footprint
 Direction = tuple[float, float]
 #: chosen: half the cone of a sonar; wider parts of a fan leave out fewer edges.
 NARROW_RAD = math.radians(15)
+#: A polygon of fewer edges is a line, which nothing is inside of.
+FEWEST_AROUND = 3
 
 
 class Echo(NamedTuple):
@@ -38,7 +40,6 @@ def cast(things: Iterable[Footprint], x: float, y: float, rays: Sequence[Directi
     """
     hits = [longest_m] * len(rays)
     (rx, ry), (lx, ly) = rays[0], rays[-1]
-    count = range(len(rays))
     for thing in things:
         px, py, reach = thing.x - x, thing.y - y, thing.reach
         # The circle around it is wholly right of the rightmost ray, or left of the leftmost, or too far.
@@ -48,22 +49,8 @@ def cast(things: Iterable[Footprint], x: float, y: float, rays: Sequence[Directi
             _circle(thing, px, py, rays, hits)
             continue
         # From inside, no edge is seen from its outer side.
-        edges = thing.seen_from(x, y) or (thing.edges if thing.contains(x, y) else [])
-        for ax, ay, ex, ey in edges:
-            qx, qy = ax - x, ay - y
-            sx, sy = qx + ex, qy + ey
-            if (rx * qy - ry * qx < 0.0 and rx * sy - ry * sx < 0.0) or (
-                lx * qy - ly * qx > 0.0 and lx * sy - ly * sx > 0.0
-            ):
-                continue
-            crossed = qx * ey - qy * ex
-            for ray in count:
-                dx, dy = rays[ray]
-                across = dx * ey - dy * ex
-                if across != 0.0:
-                    along = crossed / across
-                    if 0.0 <= along < hits[ray] and 0.0 <= (qx * dy - qy * dx) / across <= 1.0:
-                        hits[ray] = along
+        if not _edges(thing, x, y, rays, hits, is_inside=False) and len(thing.edges) >= FEWEST_AROUND:
+            _edges(thing, x, y, rays, hits, is_inside=True)
     return hits
 
 
@@ -76,6 +63,33 @@ def narrow_parts(headings_rad: Sequence[float]) -> Iterator[tuple[int, int]]:
             first = ray
     if headings_rad:
         yield first, len(headings_rad)
+
+
+def _edges(
+    thing: Footprint, x: float, y: float, rays: Sequence[Direction], hits: list[float], *, is_inside: bool
+) -> bool:
+    """Shorten what the edges of a polygon stop; tell whether one was seen from its outer side."""
+    (rx, ry), (lx, ly) = rays[0], rays[-1]
+    is_seen = False
+    for ax, ay, ex, ey in thing.edges:
+        qx, qy = ax - x, ay - y
+        crossed = qx * ey - qy * ex
+        if crossed < 0.0:
+            is_seen = True
+        elif not is_inside:
+            continue
+        sx, sy = qx + ex, qy + ey
+        if (rx * qy - ry * qx < 0.0 and rx * sy - ry * sx < 0.0) or (
+            lx * qy - ly * qx > 0.0 and lx * sy - ly * sx > 0.0
+        ):
+            continue
+        for ray, (dx, dy) in enumerate(rays):
+            across = dx * ey - dy * ex
+            if across != 0.0:
+                along = crossed / across
+                if 0.0 <= along < hits[ray] and 0.0 <= (qx * dy - qy * dx) / across <= 1.0:
+                    hits[ray] = along
+    return is_seen
 
 
 def _circle(thing: Footprint, px: float, py: float, rays: Sequence[Direction], hits: list[float]) -> None:

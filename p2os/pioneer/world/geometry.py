@@ -72,10 +72,6 @@ class Footprint:
             return False
         return all((x - ax) * ey - (y - ay) * ex <= 0.0 for ax, ay, ex, ey in self.edges)
 
-    def seen_from(self, x: float, y: float) -> list[tuple[float, float, float, float]]:
-        """Return the edges whose outer side looks at a point."""
-        return [edge for edge in self.edges if (x - edge[0]) * edge[3] - (y - edge[1]) * edge[2] > 0.0]
-
     def hit(self, x: float, y: float, dx: float, dy: float) -> float:
         """Return how far a ray of unit direction goes until it meets this, or infinity."""
         if not self.edges:

@@ -155,5 +155,4 @@ def _missed(outcome: Outcome) -> object:
 
 
 def _reported(outcome: Outcome, at: float) -> str:
-    what = outcome.failures[0] if outcome.failures else "passes"
-    return f"{what} (margin {at:.2f})"
+    return f"{outcome.failures[0] if outcome.failures else 'passes'} (margin {at:.2f})"

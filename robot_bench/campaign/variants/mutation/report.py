@@ -155,8 +155,7 @@ def _survivors(mutation: Mutation) -> Iterator[str]:
     yield ""
     yield "survived: the run was another, and no goal noticed"
     for mutant in survivors[:MOST_SHOWN]:
-        place = mutation.place(mutant)
-        yield f"  {place:20} {mutation.words(mutant)}"[:_WIDTH]
+        yield f"  {mutation.place(mutant):20} {mutation.words(mutant)}"[:_WIDTH]
         if source := mutation.source(mutant):
             yield f"  {'':20} {source}"[:_WIDTH]
     if len(survivors) > MOST_SHOWN:

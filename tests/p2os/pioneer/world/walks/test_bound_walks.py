@@ -487,7 +487,7 @@ def touches(draw: random.Random) -> Iterator[str]:
                 rays = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0), (0.6, 0.8))
                 yield said([shape.hit(x, y, *ray) for ray in rays])
                 if shape.edges:
-                    yield said((shape.overlaps(hull), shape.seen_from(x, y), shape.normal_at(x, y)))
+                    yield said((shape.overlaps(hull), shape.normal_at(x, y)))
     for _ in range(60):
         corners = [(draw.randrange(4), draw.randrange(4), 0) for _ in range(draw.randint(4, 9))]
         turned = draw.choice(([*corners], [(x, z, y) for x, y, z in corners], [(z, x, y) for x, y, z in corners]))

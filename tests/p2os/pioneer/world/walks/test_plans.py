@@ -70,7 +70,7 @@ def footprints(draw: random.Random) -> Iterator[str]:
         x, y, turn = item.x_m + draw.uniform(-2, 2), item.y_m + draw.uniform(-2, 2), draw.uniform(-3, 3)
         hull = geometry.placed(geometry.hull_polygon(P2DX.body), x, y, turn)
         rays = [(math.cos(turn + step / 20), math.sin(turn + step / 20)) for step in range(-6, 7)]
-        yield said((shape.bounds, shape.reach, shape.edges, shape.contains(x, y), shape.seen_from(x, y)))
+        yield said((shape.bounds, shape.reach, shape.edges, shape.contains(x, y)))
         yield said((shape.distance_to_point(x, y), shape.distance(hull), shape.way_out(hull), shape.normal_at(x, y)))
         yield said([shape.hit(x, y, *ray) for ray in rays])
         yield said(ray_cast.cast([shape], x, y, rays, 3.0))
