@@ -4,7 +4,7 @@
  */
 #include <string.h>
 
-#include "operations.h"
+#include "interpreter.h"
 #include "registers.h"
 
 enum { MAIN_SP = 8, PROCESS_SP, PRIMASK = 16, BASEPRI, BASEPRI_MAX, FAULTMASK, CONTROL };
@@ -34,12 +34,12 @@ static uint32_t read_special(struct interpreter *s, uint32_t number)
     }
 }
 
-void interpreter_mrs(struct interpreter *s, const struct op *op) { R(d) = read_special(s, op->imm); }
+void interpreter_mrs(struct interpreter *s, const struct op *op) { s->is.r[op->d] = read_special(s, op->imm); }
 
 /* `imm`: the number below, the mask above. */
 void interpreter_msr(struct interpreter *s, const struct op *op)
 {
-    const uint32_t number = op->imm & 0xFF, mask = op->imm >> 8, value = R(n), masked = value & BASEPRI_BITS;
+    const uint32_t number = op->imm & 0xFF, mask = op->imm >> 8, value = s->is.r[op->n], masked = value & BASEPRI_BITS;
     if (number < MAIN_SP) {
         if (!(number & 4) && mask & FLAGS_MASK >> 2) {
             interpreter_set_flags(s, value);
