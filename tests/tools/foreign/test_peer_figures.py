@@ -34,7 +34,7 @@ def test_nobody_at_the_port_is_one_line(capsys: pytest.CaptureFixture[str]) -> N
 
 @pytest.mark.soak
 def test_a_robot_of_ours_does_what_the_manual_says(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    world = Path(__file__).parents[2] / "robot_bench/experiments/validation/scenarios/plain.toml"
+    world = Path(__file__).parents[3] / "robot_bench/experiments/validation/scenarios/plain.toml"
     words = ["serve", "--robot", "p3dx", "--body", "kinematic", "--world", str(world), "--port", "tcp:127.0.0.1:0"]
     process = subprocess.Popen([sys.executable, "-m", "p2os", *words, "--json"], stdout=subprocess.PIPE, text=True)
     try:

@@ -43,9 +43,10 @@ def main() -> int:
             held.callback(busy.kill)
         for number in range(1, words.times + 1):
             done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-            failed.update(FAILED.findall(done.stdout))
+            names = FAILED.findall(done.stdout)
+            failed.update(names)
             came_to = done.stdout.strip().splitlines()[-1] if done.stdout.strip() else done.stderr.strip()
-            sys.stdout.write(f"{number} of {words.times}: {came_to}\n")
+            sys.stdout.write("\n  ".join((f"{number} of {words.times}: {came_to}", *names)) + "\n")
             sys.stdout.flush()
             if done.returncode not in (0, 1):
                 return 1
