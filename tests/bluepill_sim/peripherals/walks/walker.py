@@ -3,8 +3,9 @@
 Theory of operation. A walk has episodes. Each begins on a board out of reset, whose core sleeps, sets the peripheral up
 in a mode, each in turn, and goes some steps at random: what the mode expects (a word, a START, a call from outside),
 registers at random, time. What a step did is a line: what was done and read, which registers are otherwise than before,
-edges and words that came out, lines inside the chip, when a part acts next, warnings, resets. In the middle of each
-episode the board is saved and another one goes on from there, which no line may show.
+and what a device in C holds beside them; edges and words that came out, lines inside the chip, waves that are offered,
+when a part acts next, warnings, resets, what C called Python for and how often. In the middle of each episode the board
+is saved and another one goes on from there, which no line may show.
 
 Every other episode has somebody who looks at the pins: models that talk in words make their edges only then. In every
 third a program makes the accesses, which comes to each in the middle of a block: models see such a one at its time only
@@ -13,9 +14,11 @@ where they say that it matters.
 Invariant: an episode follows from its name alone, on every version of Python.
 """
 
+import ctypes
 import random
 import struct
 import zlib
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
@@ -25,11 +28,12 @@ from bluepill_sim import BluePill
 from bluepill_sim.core.unicorn_core import Reg
 from bluepill_sim.fabric.fabric import OWN_COMMANDS
 from bluepill_sim.fabric.pins import PinDrive
-from bluepill_sim.fabric.registers import WORD, Register, fields_of
+from bluepill_sim.fabric.registers import OWN_ANSWERS, WORD, Register, fields_of
 from bluepill_sim.fabric.subscriptions import EDGE, Of, read_rows
 from bluepill_sim.parts import CanNetwork, CanNode
 from bluepill_sim.peripherals.spi import Loopback
 from simbase.state import Stateful
+from tests.bluepill_sim.counted_calls import counted_calls
 from tests.bluepill_sim.machine import Machine
 
 #: SRAM that DMA reads and writes: the last bytes of it are in the trace, as a checksum.
@@ -47,6 +51,8 @@ _MEMORY = "PMA_"
 _EXPECTED = 0xFF
 #: The frequencies in a trace.
 _CLOCKS = ("hclk_hz", "pclk1_hz", "pclk2_hz", "timer1_hz", "timer2_hz", "usb_hz", "adc_divider", "rtcclk_hz")
+#: What C calls Python for by what other episodes had it keep: blocks, and parts that hear pins.
+_OF_OTHERS = ("unknown_block", f"/{OWN_ANSWERS - 1}")
 #: What no device knows.
 _NO_COMMAND = OWN_COMMANDS + 99
 #: Words of a part that has no memory of packets.
@@ -192,7 +198,9 @@ class WalkedBoard:
     """A board whose core sleeps, with something at each of its buses; and what was heard of it."""
 
     def __init__(self, *, is_alone: bool) -> None:
-        self.board = Machine("sleep: wfi\nb sleep", {}).deafen().board
+        self.calls = Counter[str]()
+        with counted_calls(self.calls):
+            self.board = Machine("sleep: wfi\nb sleep", {}).deafen().board
         self.network, self.node = CanNetwork(), CanNode()
         self.network.join(self.node)
         if not is_alone:
@@ -250,6 +258,7 @@ class WalkedBoard:
         for name, port in board.serial_ports.items():
             self._closing.append(port.subscribe(self._take_rows(name)))
         self.heard.clear()
+        self.calls.clear()
 
     def _take_edges(self, rows: bytes) -> None:
         self.heard += [
@@ -274,6 +283,23 @@ def _plain(value: object) -> object:
 def boards(*, is_alone: bool) -> tuple[WalkedBoard, WalkedBoard]:
     """Return the board on which episodes begin, and the one on which they go on."""
     return WalkedBoard(is_alone=is_alone), WalkedBoard(is_alone=is_alone)
+
+
+@cache
+def _gaps(kind: Any) -> int:
+    """Return a struct's bytes as a number, all ones where a field of it stands."""
+    if not hasattr(kind, "_fields_"):
+        inner, count = getattr(kind, "_type_", None), getattr(kind, "_length_", 1)
+        if not hasattr(inner, "_fields_"):
+            return int((1 << 8 * ctypes.sizeof(kind)) - 1)
+        return sum(_gaps(inner) << 8 * ctypes.sizeof(inner) * n for n in range(count))
+    return sum(_gaps(field[1]) << 8 * getattr(kind, field[0]).offset for field in kind._fields_)
+
+
+def _without_gaps(struct_held: Any) -> int:
+    """Return a checksum of a struct; between its fields a compiler writes what it likes."""
+    meant = int.from_bytes(bytes(struct_held), "little") & _gaps(type(struct_held))
+    return zlib.crc32(meant.to_bytes(ctypes.sizeof(struct_held), "little"))
 
 
 @cache
@@ -536,11 +562,14 @@ class RegisterWalker:
         """Have the other board go on from here."""
         self._other.go_on_from(self._now.saved())
         self._now, self._other = self._other, self._now
+        self._now.calls.clear()
 
     def _step(self, act: Callable[[], None]) -> None:
         self._done.clear()
         act()
         self.board.chip.deliver()
+        counts = sorted(self._now.calls.items())
+        calls = " ".join(f"{name} {count}" for name, count in counts if not name.endswith(_OF_OTHERS))
         now = dict(self._all())
         changed = [
             f"{name} {value:#x}" if isinstance(value, int) else f"{name} {value}"
@@ -550,8 +579,9 @@ class RegisterWalker:
         heard = self._now.heard
         if len(heard) > _SHOWN:
             heard[_SHOWN:] = [f"and {len(heard) - _SHOWN} more: {zlib.crc32(' '.join(heard).encode()):08x}"]
-        self.lines.append(f"{' '.join(self._done)} | {', '.join(changed)} | {' '.join(heard)}".rstrip(" |"))
+        self.lines.append(f"{' '.join(self._done)} | {', '.join(changed)} | {' '.join(heard)} | {calls}".rstrip(" |"))
         heard.clear()
+        self._now.calls.clear()
 
     def _all(self) -> Iterator[tuple[str, object]]:
         """Go through all that can be seen now; of parts that hold what they held, what only they can say."""
@@ -566,6 +596,8 @@ class RegisterWalker:
             if len(words) > _USUAL_WORDS and not is_same:
                 yield f"{name} memory", zlib.crc32(memoryview(words)[_USUAL_WORDS:])
             yield f"{name} acts", part.due_ns
+            if part.native is not None:
+                yield f"{name} holds", f"{_without_gaps(part.native):08x}"
         lines = board.chip.pins.fabric.lines
         yield "lines", " ".join(str(n) for n, level in enumerate(lines) if level)
         yield "pending", board.chip.processor.nvic.pending
@@ -576,6 +608,7 @@ class RegisterWalker:
             self._drives = "".join(_LETTERS[pin.output] for pin in board.pins)
         yield "wires", self._wires
         yield "drives", self._drives
+        yield "waves", f"{_without_gaps(board.chip.pins.fabric.wave_structs):08x}"
         yield "routes", " ".join(f"{name} {route}" for name, route in board.chip.pins.remaps.items() if route)
         yield "memory", zlib.crc32(board.read_memory(BUFFER, BUFFER_BYTES) or b"")
         yield "warnings", " / ".join(board.warnings)
