@@ -51,8 +51,8 @@ _MEMORY = "PMA_"
 _EXPECTED = 0xFF
 #: The frequencies in a trace.
 _CLOCKS = ("hclk_hz", "pclk1_hz", "pclk2_hz", "timer1_hz", "timer2_hz", "usb_hz", "adc_divider", "rtcclk_hz")
-#: What C calls Python for by what other episodes had it keep: blocks, and parts that hear pins.
-_OF_OTHERS = ("unknown_block", f"/{OWN_ANSWERS - 1}")
+#: What C calls Python for by what other episodes had it keep: blocks, and parts that hear pins, and act then.
+_OF_OTHERS = ("unknown_block", "event", f"/{OWN_ANSWERS - 1}")
 #: What no device knows.
 _NO_COMMAND = OWN_COMMANDS + 99
 #: Words of a part that has no memory of packets.
@@ -289,7 +289,8 @@ def boards(*, is_alone: bool) -> tuple[WalkedBoard, WalkedBoard]:
 def _gaps(kind: Any) -> int:
     """Return a struct's bytes as a number, all ones where a field of it stands."""
     if not hasattr(kind, "_fields_"):
-        inner, count = getattr(kind, "_type_", None), getattr(kind, "_length_", 1)
+        inner: Any = getattr(kind, "_type_", None)
+        count = int(getattr(kind, "_length_", 1))
         if not hasattr(inner, "_fields_"):
             return int((1 << 8 * ctypes.sizeof(kind)) - 1)
         return sum(_gaps(inner) << 8 * ctypes.sizeof(inner) * n for n in range(count))
@@ -298,7 +299,8 @@ def _gaps(kind: Any) -> int:
 
 def _without_gaps(struct_held: Any) -> int:
     """Return a checksum of a struct; between its fields a compiler writes what it likes."""
-    meant = int.from_bytes(bytes(struct_held), "little") & _gaps(type(struct_held))
+    kind: Any = type(struct_held)
+    meant = int.from_bytes(bytes(struct_held), "little") & _gaps(kind)
     return zlib.crc32(meant.to_bytes(ctypes.sizeof(struct_held), "little"))
 
 
