@@ -24,6 +24,7 @@ from tools.mutants.changes import ROOT, ChangeError
 from tools.mutants.judge import NOTICED, MutantOutcome
 from tools.mutants.ledger import SURVIVORS, Ledger, survivors, with_new, write_survivors
 from tools.mutants.mutant import SourceMutant
+from tools.mutants.native_lines import NativeLines
 from tools.mutants.nearest import Nearest, counted_lines
 from tools.mutants.sampling import Court, sample
 
@@ -101,7 +102,10 @@ def _judged(parser: argparse.ArgumentParser, options: argparse.Namespace) -> int
         found = changes.mutants_of(lines)
     if options.count is not None:
         random.Random(1 if options.seed is None else options.seed).shuffle(found)
-    nearest = Nearest(ROOT, counted_lines(ROOT / ".coverage", ROOT))
+    native = NativeLines(ROOT)
+    if options.count is not None and not options.list:
+        native.count(Nearest(ROOT, {}), [mutant.path for mutant in found[: options.count]], options.jobs)
+    nearest = Nearest(ROOT, {**counted_lines(ROOT / ".coverage", ROOT), **native.lines()})
     if options.list:
         for mutant in found[: options.count]:
             print(f"{mutant.name}\n    {' '.join(nearest.of(mutant.path, mutant.first_line)) or 'no tests'}")
