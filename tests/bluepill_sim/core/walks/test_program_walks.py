@@ -118,7 +118,7 @@ def _lines(board: BluePill, number: int, base: int, stop: int, *, is_exact: bool
 
 
 def _asked(core: str, _: random.Random) -> Iterator[str]:
-    """Yield how often C calls Python, by what for, while programs run, and how many rows of blocks it has written.
+    """Yield how often C calls Python, by what for, while programs run; rows of blocks, and the last access at its time.
 
     What it can answer itself it does; of a loop that waits it writes the last rows alone, however long it goes round.
     """
@@ -131,7 +131,9 @@ def _asked(core: str, _: random.Random) -> Iterator[str]:
         board.restore(fresh)
         lines = [f"program {number}"]
         for _line in _lines(board, number, *_image()[1][number], is_exact=core == "exact"):
-            lines.append(f"{board.chip.engine.shared.logged} {sorted(counts.items())}")
+            shared = board.chip.engine.shared
+            accesses = f"{shared.access_cycle} {shared.access_pc:x} {shared.exact_stops}"
+            lines.append(f"{shared.logged} {accesses} {sorted(counts.items())}")
             counts.clear()
         yield "\n".join(lines)
 

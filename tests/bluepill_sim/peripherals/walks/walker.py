@@ -9,7 +9,7 @@ is saved and another one goes on from there, which no line may show.
 
 Every other episode has somebody who looks at the pins: models that talk in words make their edges only then. In every
 third a program makes the accesses, which comes to each in the middle of a block: models see such a one at its time only
-where they say that it matters.
+where they say that it matters; then the line has its cycle.
 
 Invariant: an episode follows from its name alone, on every version of Python.
 """
@@ -396,15 +396,19 @@ class RegisterWalker:
     def _accessed(self, access: object, address: int, value: int = 0) -> int | None:
         """Have a program make an access; return what R2 is then; nothing where the core does not sleep before it."""
         board = self.board
-        engine, end_ns = board.chip.engine, board.now_ns + _PROGRAM_NS
+        engine: Any = board.chip.engine
+        end_ns, shared = board.now_ns + _PROGRAM_NS, engine.shared
         if not board.is_asleep:
             return None
+        shared.access_cycle = 0
         for register, word in ((Reg.R0, 1 + self.number(_MOST_ROUNDS)), (Reg.R1, address), (Reg.R2, value)):
             engine.registers[register] = word
         engine.jump(self._now.entries[access] | 1)
         board.chip.processor.wake()
         while not board.is_asleep and board.now_ns < end_ns:
             board.advance_to(min(board.now_ns + _STEP_NS, end_ns))
+        if shared.access_cycle:  # the core has worked it out, since the part needs it
+            self.note(f"in cycle {shared.access_cycle}")
         return int(engine.registers[Reg.R2])
 
     def attempt(self, act: Callable[[], object]) -> None:
