@@ -181,6 +181,24 @@ def _adc_trigger(w: RegisterWalker) -> None:
     w.write("EXTI.SWIER", w.pick((1 << 11, 1 << 15)))
 
 
+def _adc_in_parts(w: RegisterWalker) -> None:
+    """Start a sequence part by part, which may become shorter under way, or go on as a whole."""
+    name = w.pick(("ADC1", "ADC2"))
+    discontinuous, start = w.pick(((0x1000, _JSWSTART), (0x1000, _JSWSTART), (0x800, _SWSTART)))
+    w.turn(f"{name}.CR1", on=discontinuous, off=0x400)
+    w.turn(f"{name}.CR2", on=1 | 7 << 17 | 7 << 12 | _EXTTRIG | _JEXTTRIG, off=2)
+    for _ in range(3 + w.number(4)):
+        w.turn(f"{name}.CR2", on=start)
+        w.run(w.pick((5_000, 70_000, 70_000)))
+        if not w.number(3):
+            w.write(f"{name}.JSQR", w.number(4) << 20 | w.number(5) << 15 | w.number(5) << 10)
+            w.write(f"{name}.SQR1", w.number(4) << 20)
+        if not w.number(4):
+            w.turn(f"{name}.CR1", off=discontinuous)
+    for register in ("JDR1", "JDR2", "JDR3", "JDR4", "SR"):
+        w.read(f"{name}.{register}")
+
+
 def _adc_calibrate(w: RegisterWalker) -> None:
     name = w.pick(("ADC1", "ADC2"))
     w.turn(f"{name}.CR2", on=w.pick((8, 4, 4, 1)), off=w.pick((0, 1, 2)))
@@ -201,7 +219,8 @@ def _adc_pin(w: RegisterWalker) -> None:
 
 _ADC = RegisterWalk(
     name="ADC", parts=("ADC1", "ADC2", "DMA1"), begin=_adc_begin,
-    moves=(_adc_start, _adc_start, _adc_start, _adc_trigger, _adc_take, _adc_take, _adc_calibrate, _adc_pin),
+    moves=(_adc_start, _adc_start, _adc_start, _adc_trigger, _adc_take, _adc_take, _adc_calibrate, _adc_pin,
+           _adc_in_parts),
     spans_ns=(125, 1_000, 3_500, 7_000, 14_000, 30_000, 100_000), beside=("TIM1",), at_random=18, episodes=36,
 )  # fmt: skip
 

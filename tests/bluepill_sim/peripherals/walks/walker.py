@@ -16,6 +16,7 @@ Invariant: an episode follows from its name alone, on every version of Python.
 
 import ctypes
 import random
+import re
 import struct
 import zlib
 from collections import Counter
@@ -69,6 +70,8 @@ _PROGRAM, _HALFWORD_AT = 0x2000_0800, 2
 _WAIT = (0x3801, 0xD1FD, 0x46C0, 0x46C0)
 _SLEEP = (0xBF30, 0xE7FD)
 _ACCESSES = {"load": 0x680A, 4: 0x600A, 2: 0x800A, 1: 0x700A}
+#: Where in that program it was warned: of an access that needs no time, where its block begins, or one before it.
+_PLACE = re.compile(r" at 0x200008[0-9a-f]{2}\b")
 #: Most rounds, and how long a program has: some accesses never end.
 _MOST_ROUNDS, _PROGRAM_NS, _STEP_NS = 24, 40_000, 2_500
 
@@ -617,7 +620,7 @@ class RegisterWalker:
         yield "waves", f"{_without_gaps(board.chip.pins.fabric.wave_structs):08x}"
         yield "routes", " ".join(f"{name} {route}" for name, route in board.chip.pins.remaps.items() if route)
         yield "memory", zlib.crc32(board.read_memory(BUFFER, BUFFER_BYTES) or b"")
-        yield "warnings", " / ".join(board.warnings)
+        yield "warnings", _PLACE.sub("", " / ".join(board.warnings))
         yield "resets", " ".join(f"{cause.name} {count}" for cause, count in board.resets.items())
         clocks = board.chip.clocks
         yield "clocks", " ".join(str(getattr(clocks, name)) for name in _CLOCKS)
