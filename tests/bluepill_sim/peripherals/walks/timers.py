@@ -90,6 +90,17 @@ def _tim(number: int) -> RegisterWalk:  # noqa: C901, PLR0915 - a function a mov
             w.run(w.pick((6_000, 11_000, 20_125)))
             w.write(f"{name}.CCR{n}", w.pick((0, 3, 10, 20, 30, 39, 40, 50)))
 
+    def preload(w: RegisterWalker) -> None:
+        """Write a compare value that waits for the update event: others, and the one that is active."""
+        n, active = 1 + w.number(4), w.pick((0, 1, 6, 7))
+        w.write(f"{name}.CCMR{(n + 1) // 2}", w.pick((0x6868, 0x6868, 0x7878, 0x6860, 0x6968)))
+        w.write(f"{name}.ARR", 39)
+        w.turn(f"{name}.CR1", on=1)
+        w.write(f"{name}.CCR{n}", active)
+        w.write(f"{name}.EGR", 1)
+        for change in (3, *(w.pick((0, 1, 2, 0x1_0000, 0x1_0003)) for _ in range(4))):
+            w.write(f"{name}.CCR{n}", active ^ change)
+
     def compare(w: RegisterWalker) -> None:
         w.write(f"{name}.CCR{1 + w.number(4)}", w.number(40))
 
@@ -118,7 +129,7 @@ def _tim(number: int) -> RegisterWalk:  # noqa: C901, PLR0915 - a function a mov
                 other_register = w.pick(("BDTR", "DIER", "SR") if number == 1 else ("DIER", "SR", "CR2"))
                 w.write(f"{name}.{other_register}", w.look(f"{name}.{other_register}"))
 
-    moves = (pin, pin, glitch, glitch, compare, clear, clear, generate, shape, shape, duty, burst)
+    moves = (pin, pin, glitch, glitch, compare, clear, clear, generate, shape, shape, duty, burst, preload)
     return RegisterWalk(
         name=name, parts=(name, "DMA1"), begin=begin, remaps=_TIM_REMAPS[number],
         moves=(*moves, crystal) if number == 1 else moves,
