@@ -12,8 +12,8 @@ from bluepill_sim.core.unicorn_core import GENERAL
 from bluepill_sim.extension.library import core_chosen
 from bluepill_sim.native.engine import NativeEngine
 from bluepill_sim.program.image import Image
+from tests.bluepill_sim.core.walks.counted_calls import counted_calls
 from tests.bluepill_sim.core.walks.programs import assembled
-from tests.bluepill_sim.counted_calls import counted_calls
 from tests.bluepill_sim.machine import STACK, listen
 from tests.tools.suite.approved import judge_alike, judge_of
 

@@ -34,7 +34,7 @@ from bluepill_sim.fabric.subscriptions import EDGE, Of, read_rows
 from bluepill_sim.parts import CanNetwork, CanNode
 from bluepill_sim.peripherals.spi import Loopback
 from simbase.state import Stateful
-from tests.bluepill_sim.counted_calls import counted_calls
+from tests.bluepill_sim.core.walks.counted_calls import counted_calls
 from tests.bluepill_sim.machine import Machine
 
 #: SRAM that DMA reads and writes: the last bytes of it are in the trace, as a checksum.
