@@ -66,7 +66,7 @@ def _shown(board: BluePill) -> str:
     memory = zlib.crc32(board.read_memory(0x2000_0000, 0x5000) or b"")
     pins = chip.pins.fabric
     parts = zlib.crc32(b"".join(bytes(part.words) + part.held for part in chip.parts.by_name.values()))
-    parts ^= zlib.crc32(pins.ports + pins.waves + pins.lines)
+    parts ^= zlib.crc32(pins.ports + pins.waves)
     tick = f"{processor.systick.next_cycle} {processor.shared.tick_control} {processor.shared.tick_count_flag}"
     rows = zlib.crc32(str(board.last_rows).encode())
     at = f"{board.now_ns} {chip.engine.cycle} {board.pc:x}"

@@ -303,8 +303,10 @@ def _gaps(kind: Any) -> int:
 def _without_gaps(struct_held: Any) -> int:
     """Return a checksum of a struct; between its fields a compiler writes what it likes."""
     kind: Any = type(struct_held)
-    meant = int.from_bytes(bytes(struct_held), "little") & _gaps(kind)
-    return zlib.crc32(meant.to_bytes(ctypes.sizeof(struct_held), "little"))
+    held, meant = bytes(struct_held), _gaps(kind)
+    if meant.bit_count() == 8 * len(held):  # there are none
+        return zlib.crc32(held)
+    return zlib.crc32((int.from_bytes(held, "little") & meant).to_bytes(len(held), "little"))
 
 
 @cache
