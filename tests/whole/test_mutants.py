@@ -15,6 +15,7 @@ from tools.mutants.judge import Judge, MutantOutcome, MutantStatus
 from tools.mutants.languages import c_source, python_source
 from tools.mutants.ledger import Ledger
 from tools.mutants.mutant import SourceMutant
+from tools.mutants.native_lines import NativeLines
 from tools.mutants.natives import Natives
 from tools.mutants.nearest import Nearest, cheapest_first
 from tools.mutants.tree import Tree
@@ -396,6 +397,97 @@ PROJECT = {
 
 #: What the copy has of the tool: it runs there.
 OURS = ("forks", "outcome")
+
+
+LIBRARY = """\
+#include "limit.h"
+int near_ones, far_ones;
+int is_far(int distance)
+{
+    if (is_over(distance)) {
+        return ++far_ones;
+    }
+    near_ones += 2;
+    return 0;
+}
+"""
+OF_LIBRARY = {
+    "pack/far.c": LIBRARY,
+    "pack/limit.h": "static int is_over(int distance)\n{\n    return distance > 9;\n}\n",
+    "pyproject.toml": (
+        "[tool.pytest.ini_options]\nmarkers = ['slow', 'soak', 'hardware']\n"
+        "[tool.setuptools]\next-modules = [{name = 'pack._far', sources = ['pack/*.c']}]\n"
+    ),
+    "conftest.py": PROJECT["conftest.py"],
+    "tests/test_far.py": (
+        "import ctypes\nfrom pathlib import Path\n"
+        "def test_far():\n    assert ctypes.CDLL(str(Path('pack/_far.so').resolve())).is_far(11)\n"
+        "def test_that_fails():\n    assert False\n"
+    ),
+}
+
+
+@pytest.mark.slow
+def test_gcov_counts_the_lines_in_c_that_a_file_of_tests_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name, text in OF_LIBRARY.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    git(tmp_path, "init")
+    monkeypatch.setattr("tools.mutants.nearest.TESTS_OF_C", {"pack": ("tests",)})
+    native = NativeLines(tmp_path)
+    native.count(Nearest(tmp_path, {}), ["pack/part.py"], 1)
+    assert (native.lines(), capsys.readouterr().err) == ({}, "")
+    native.count(Nearest(tmp_path, {}), ["pack/far.c"], 2)
+    far, ran = "tests/test_far.py", {5, 6}
+    assert NativeLines(tmp_path).lines() == native.lines()
+    assert native.lines()["pack/limit.h"] == {"": {1, 3}, far: {1, 3}}
+    assert {*native.lines()["pack/far.c"]} == {"", far}
+    assert native.lines()["pack/far.c"][far] >= ran
+    assert native.lines()["pack/far.c"][""] >= ran | {8}
+    assert 8 not in native.lines()["pack/far.c"][far]
+    assert "lines in C: 1 of 1 files of tests" in capsys.readouterr().err
+    # What has not changed is not counted again, and what was counted on another text is not known.
+    counted: list[str] = []
+    monkeypatch.setattr("tools.mutants.native_lines._counters", lambda *_: None)
+
+    def note(_: object, name: str) -> dict[str, tuple[list[int], list[int]]]:
+        counted.append(name)
+        return {}
+
+    monkeypatch.setattr("tools.mutants.native_lines._counted", note)
+    (tmp_path / "tests" / "test_near.py").write_text("def test_near():\n    assert True\n")
+    native.count(Nearest(tmp_path, {}), ["pack/far.c"], 1)
+    assert counted == ["tests/test_near.py"]
+    (tmp_path / "pack" / "far.c").write_text(f"\n{LIBRARY}")
+    assert {*native.lines()} == {"pack/limit.h"}
+    native.count(Nearest(tmp_path, {}), ["pack/far.c"], 1)
+    assert counted[1:] == [far, "tests/test_near.py"]
+    assert native.lines() == {}
+    (tmp_path / far).write_text("")
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(OSError, match="gcov"):
+        native.count(Nearest(tmp_path, {}), ["pack/far.c"], 1)
+
+
+def test_of_a_line_in_c_those_are_asked_that_have_run_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    names = [f"tests/test_{letter}.py" for letter in "abcdefg"]
+    (tmp_path / "tests").mkdir()
+    for name in names:
+        (tmp_path / name).write_text("")
+    monkeypatch.setattr("tools.mutants.nearest.TESTS_OF_C", {"pack/far.c": (names[1], names[0])})
+    a, b, c, d, *_ = names
+    ran = {"": {3, 4, 20}, a: {3, 20}, b: {4}, c: {3}, d: {3, 4, 20}, "tests/test_gone.py": {3}}
+    nearest = Nearest(tmp_path, {"pack/far.c": {name: frozenset(lines) for name, lines in ran.items()}})
+    assert nearest.of("pack/far.c", 3) == (a, d, c, b), "whom the table names first, then who runs most of the file"
+    assert nearest.of("pack/far.c", 4) == (b, d, a)
+    assert nearest.of("pack/far.c", 7) == (b, d, a), "a line further on in the statement"
+    assert nearest.of("pack/far.c", 8) == (b, a), "no code: those of the table alone"
+    assert nearest.of("pack/far.c", 20) == (a, d, b)
+    assert nearest.of("pack/other.c", 3) == ()
+    assert nearest.of_package_in_c("pack") == (a, b)
+    assert nearest.of_package_in_c("pac") == ()
 
 
 @pytest.fixture

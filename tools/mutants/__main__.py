@@ -24,6 +24,7 @@ from tools.mutants.changes import ROOT, ChangeError
 from tools.mutants.judge import NOTICED, MutantOutcome
 from tools.mutants.ledger import SURVIVORS, Ledger, survivors, with_new, write_survivors
 from tools.mutants.mutant import SourceMutant
+from tools.mutants.native_lines import NativeLines
 from tools.mutants.nearest import Nearest, counted_lines
 from tools.mutants.sampling import Court, sample
 
@@ -63,6 +64,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--count", type=_positive, help="how many to draw (default: all)")
     parser.add_argument("--seed", type=int, help="of the draw (default: 1)")
     parser.add_argument("--floor", type=float, help="per cent that are to be noticed (default: all of them)")
+    parser.add_argument(
+        "--gcov", action="store_true", help="first count the lines in C that each file of tests runs; it is kept"
+    )
     parser.add_argument("--note", action="store_true", help="add survivors to the committed list")
     parser.add_argument("--list", action="store_true", help="only print what would be judged, and by which tests")
     cores = len(os.sched_getaffinity(0))
@@ -101,7 +105,10 @@ def _judged(parser: argparse.ArgumentParser, options: argparse.Namespace) -> int
         found = changes.mutants_of(lines)
     if options.count is not None:
         random.Random(1 if options.seed is None else options.seed).shuffle(found)
-    nearest = Nearest(ROOT, counted_lines(ROOT / ".coverage", ROOT))
+    native = NativeLines(ROOT)
+    if options.gcov:
+        native.count(Nearest(ROOT, {}), [mutant.path for mutant in found[: options.count]], options.jobs)
+    nearest = Nearest(ROOT, {**counted_lines(ROOT / ".coverage", ROOT), **native.lines()})
     if options.list:
         for mutant in found[: options.count]:
             print(f"{mutant.name}\n    {' '.join(nearest.of(mutant.path, mutant.first_line)) or 'no tests'}")

@@ -51,8 +51,6 @@ PYTEST = (
 )  # fmt: skip
 #: Which tests are asked first, and which when these have not noticed anything.
 SHORT, LONG = "not slow and not soak and not hardware", "slow and not soak and not hardware"
-#: Variables that the tests do not get; what is compiled is kept in the copy.
-NOT_INHERITED = ("PYTEST", "XDG_", "MAKE", "PYTHONDONTWRITEBYTECODE")
 #: How a run ends that has no tests, and how one that was at a limit of the kernel's.
 _NO_TESTS, _LIMITS = 5, {-signal.SIGXCPU, -signal.SIGPROF, -signal.SIGKILL}
 #: Tests that are left out of one question, for they fail without a change, before it is given up.
@@ -226,7 +224,8 @@ class Judge:
         if self._server is not None and self._server.poll() is None:
             return self._server
         return subprocess.Popen(
-            [sys.executable, "-m", "tools.mutants.forks"], cwd=self._tree.folder, env=self._environment(),
+            [sys.executable, "-m", "tools.mutants.forks"],
+            cwd=self._tree.folder, env=self._tree.environment(self._scratch),
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, bufsize=0,
         )  # fmt: skip
 
@@ -244,13 +243,6 @@ class Judge:
             with contextlib.suppress(ProcessLookupError, PermissionError):
                 os.killpg(self._running, signal.SIGKILL)
             self._running = 0
-
-    def _environment(self) -> dict[str, str]:
-        """Return the tests' environment: the copy comes before what is installed, and the user's files stay his."""
-        kept = {name: value for name, value in os.environ.items() if not name.startswith(NOT_INHERITED)}
-        folder = str(self._scratch)
-        path = os.pathsep.join(map(str, self._tree.path))
-        return kept | {"PYTHONPATH": path, "HOME": folder, "TMPDIR": folder}
 
 
 def _limit_s(marked: str) -> float:

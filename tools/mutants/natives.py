@@ -73,7 +73,7 @@ class Natives:
         ]  # fmt: skip
         self._needs: dict[Path, frozenset[str]] = {}  # of an object, the files that it is made of
         for library in self._libraries:
-            of_library = _digest(tree, library)
+            of_library = sources_digest(tree, library)
             for name in library.sources:
                 file = self._object(library, name)
                 before = [kept / f"{of_library}-{file.name}{ending}" for ending in ("", ".d")]
@@ -148,7 +148,7 @@ def _needs(file: Path) -> frozenset[str]:
     return frozenset(Path(each).as_posix() for each in inside)
 
 
-def _digest(tree: Path, library: Library) -> str:
+def sources_digest(tree: Path, library: Library) -> str:
     """Return a name of all that a library may be made of."""
     hashed = hashlib.sha256(repr(library).encode())
     for folder in sorted({name.split("/")[0] for name in library.sources}):

@@ -1,10 +1,12 @@
 """Which tests stand nearest to a line of a source file, nearest first.
 
-What the suite has counted says it where it has run here (`pytest --count-lines .coverage`, as `make test` does, notes
-the lines of each file of tests); names and imports order what it says, and say it alone where it has not, and of C.
+What was counted says it: of Python by the suite where it has run here (`pytest --count-lines .coverage`, as `make test`
+does, notes the lines of each file of tests), of C by native_lines.py. Names and imports order what it says, and say it
+alone where nothing was counted.
 """
 
 import ast
+import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from functools import cache
@@ -23,7 +25,10 @@ WHOLE = "walks"
 #: What a file of tests imports that shows what modules declare, and how many of these are asked first about a line
 #: outside functions.
 DECLARED, OF_DECLARED = "tests.tools.suite.declared", 2
-#: What tests a library in C or C++, by the folder of its sources or by a file: there are no imports to read.
+#: How many lines below one that is counted another may stand in the same statement of C.
+STATEMENT = 3
+#: What tests a library in C or C++, by the folder of its sources or by a file: there are no imports to read. Of those
+#: that were counted at a line, these come first, in this order.
 TESTS_OF_C = {
     # What is made of declarations is held to them as text.
     **dict.fromkeys(
@@ -102,7 +107,8 @@ class Nearest:
 
     Args:
         root: The project.
-        counted: Of each source file, the lines that each file of tests ran; empty where the suite has not run.
+        counted: Of each source file, the lines that each file of tests ran, and of one in C, under "", those that have
+            code; empty where nothing was counted.
     """
 
     def __init__(self, root: Path, counted: Counted) -> None:
@@ -115,7 +121,7 @@ class Nearest:
     def of(self, path: str, line: int) -> tuple[str, ...]:
         """Return the files of tests nearest to a line, at most `MOST_FILES`."""
         if not path.endswith(".py"):
-            return self._of_c(path)
+            return self._of_c(path, line)
         first = self._of_declared(path) if line not in _in_functions(self._root / path) else []
         return tuple(dict.fromkeys((*first, *self._of_python(path, line))))[:MOST_FILES]
 
@@ -128,6 +134,14 @@ class Nearest:
             for path in (self._root / folder).iterdir() if path.is_file() and path.suffix != ".py"
         }  # fmt: skip
         return tuple(sorted({test, *data, *(name for name in modules if name.rpartition("/")[0] == folder)}))
+
+    def digest_of(self, test: str, root: Path) -> str:
+        """Return a name of what a file of tests says by, as it stands in a copy of the project."""
+        hashed = hashlib.sha256()
+        for each in self.made_of(test):
+            place = root / each
+            hashed.update(f"{each}\0".encode() + (place.read_bytes() if place.exists() else b""))
+        return hashed.hexdigest()[:16]
 
     def _of_python(self, path: str, line: int) -> tuple[str, ...]:
         by_name = self._by_name(path)
@@ -205,7 +219,17 @@ class Nearest:
                     waiting.append(file)
         return frozenset(found)
 
-    def _of_c(self, path: str) -> tuple[str, ...]:
+    def _of_c(self, path: str, line: int) -> tuple[str, ...]:
+        by_name, files = self._of_c_by_name(path), self._counted.get(path, {})
+        counted = max((each for each in files.get("", ()) if each <= line), default=0)
+        ran = {name for name, lines in files.items() if counted in lines and line - counted <= STATEMENT}
+        near = [name for name in by_name if name in ran]
+        # Of the others, first who runs most of the file.
+        others = sorted((ran & {*self._tests}) - {*near}, key=lambda name: (-len(files[name]), name))
+        known = [*near, *others][: MOST_FILES - NOT_COUNTED]
+        return (*known, *[name for name in by_name if name not in known][: NOT_COUNTED if ran else MOST_FILES])
+
+    def _of_c_by_name(self, path: str) -> list[str]:
         folders = next((tests for place, tests in TESTS_OF_C.items() if f"{path}/".startswith(f"{place}/")), ())
         stem = {*Path(path).stem.split("_")}
         # Where a walk has its name, those of other sources show little of it.
@@ -216,7 +240,7 @@ class Nearest:
             for place, folder in reversed([*enumerate(folders)])
             if name == folder or name.startswith(f"{folder}/")
         }
-        return tuple(_ordered(order)[:MOST_FILES])
+        return _ordered(order)
 
 
 def cheapest_first(files: Sequence[str], lasted: Mapping[str, float]) -> tuple[str, ...]:

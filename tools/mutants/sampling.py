@@ -3,7 +3,6 @@
 Invariant: a sample is the first of a drawn order that count, whatever takes how long.
 """
 
-import hashlib
 import sys
 from collections.abc import Container, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -105,11 +104,7 @@ class Court:
 
     def _digest_of(self, name: str) -> str:
         if name not in self._digests:
-            hashed = hashlib.sha256()
-            places = {each: self._folder / "0" / TREE / each for each in self._nearest.made_of(name)}
-            for each, place in places.items():
-                hashed.update(f"{each}\0".encode() + (place.read_bytes() if place.exists() else b""))
-            self._digests[name] = hashed.hexdigest()[:16]
+            self._digests[name] = self._nearest.digest_of(name, self._folder / "0" / TREE)
         return self._digests[name]
 
 

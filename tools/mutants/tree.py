@@ -5,6 +5,7 @@ Invariant: between two mutants a copy holds what the checkout held when it was m
 
 import hashlib
 import json
+import os
 import shutil
 import subprocess
 from collections.abc import Iterator
@@ -17,6 +18,8 @@ DISTRIBUTION, DIRECT_URL = "p2os", "direct_url.json"
 
 #: Where in its folder a copy is.
 TREE = "tree"
+#: Variables that the tests do not get; what is compiled is kept in the copy.
+NOT_INHERITED = ("PYTEST", "XDG_", "MAKE", "PYTHONDONTWRITEBYTECODE")
 
 
 class Tree:
@@ -60,6 +63,12 @@ class Tree:
             (place / name).write_text(installed[0].read_text(name) or "", encoding="utf-8")
         said = {"url": self.folder.as_uri(), "dir_info": {"editable": True}}
         (place / DIRECT_URL).write_text(json.dumps(said), encoding="utf-8")
+
+    def environment(self, home: Path) -> dict[str, str]:
+        """Return the environment of tests: the copy comes before what is installed, and the user's files stay his."""
+        kept = {name: value for name, value in os.environ.items() if not name.startswith(NOT_INHERITED)}
+        path = os.pathsep.join(map(str, self.path))
+        return kept | {"PYTHONPATH": path, "HOME": str(home), "TMPDIR": str(home)}
 
     @contextmanager
     def holding(self, files: dict[str, bytes]) -> Iterator[None]:

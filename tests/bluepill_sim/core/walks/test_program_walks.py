@@ -1,22 +1,18 @@
 """Programs at random, which all cores run alike, against traces that were approved: registers, exceptions, time."""
 
-import ctypes
 import random
 import zlib
 from collections import Counter
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from collections.abc import Iterator
 from functools import cache, partial
-from typing import Any
-from unittest.mock import patch
 
 from bluepill_sim import BluePill
 from bluepill_sim.core import Reg
 from bluepill_sim.core.unicorn_core import GENERAL
-from bluepill_sim.extension.library import Callbacks, core_chosen
-from bluepill_sim.fabric import fabric
-from bluepill_sim.native import engine
+from bluepill_sim.extension.library import core_chosen
+from bluepill_sim.native.engine import NativeEngine
 from bluepill_sim.program.image import Image
+from tests.bluepill_sim.core.walks.counted_calls import counted_calls
 from tests.bluepill_sim.core.walks.programs import assembled
 from tests.bluepill_sim.machine import STACK, listen
 from tests.tools.suite.approved import judge_alike, judge_of
@@ -68,7 +64,9 @@ def _shown(board: BluePill) -> str:
     system = " ".join(str(getattr(processor, name)) for name in _SYSTEM)
     nvic = " ".join(f"{getattr(processor.nvic, name):x}" for name in _NVIC)
     memory = zlib.crc32(board.read_memory(0x2000_0000, 0x5000) or b"")
+    pins = chip.pins.fabric
     parts = zlib.crc32(b"".join(bytes(part.words) + part.held for part in chip.parts.by_name.values()))
+    parts ^= zlib.crc32(pins.ports + pins.waves)
     tick = f"{processor.systick.next_cycle} {processor.shared.tick_control} {processor.shared.tick_count_flag}"
     rows = zlib.crc32(str(board.last_rows).encode())
     at = f"{board.now_ns} {chip.engine.cycle} {board.pc:x}"
@@ -119,37 +117,23 @@ def _lines(board: BluePill, number: int, base: int, stop: int, *, is_exact: bool
     yield f"{rows} {edges} {[str(warning) for warning in board.warnings]} {board.fault!r}"
 
 
-def _counting(made: type[ctypes.Structure], counts: Counter[str]) -> Callable[..., ctypes.Structure]:
-    """Return what makes a table of callbacks of which each call is counted by its name."""
-
-    def counted(name: str, call: Any) -> Any:
-        def count(*arguments: object) -> Any:
-            counts[name] += 1
-            return call(*arguments)
-
-        return type(call)(count)
-
-    names = [field[0] for field in made._fields_]
-    return lambda *calls: made(*(counted(name, call) for name, call in zip(names, calls, strict=True)))
-
-
 def _asked(core: str, _: random.Random) -> Iterator[str]:
-    """Yield how often C calls Python, by what for, while programs run, and how many rows of blocks it has written.
+    """Yield how often C calls Python, by what for, while programs run; rows of blocks, and the last access at its time.
 
     What it can answer itself it does; of a loop that waits it writes the last rows alone, however long it goes round.
     """
     counts = Counter[str]()
-    with ExitStack() as stack:
-        stack.enter_context(patch.object(engine, "Callbacks", _counting(Callbacks, counts)))
-        stack.enter_context(patch.object(fabric, "_Calls", _counting(fabric._Calls, counts)))
+    with counted_calls(counts):
         board = _board(core)
     fresh = board.snapshot()
-    assert isinstance(board.chip.engine, engine.NativeEngine)
+    assert isinstance(board.chip.engine, NativeEngine)
     for number in COUNTED:
         board.restore(fresh)
         lines = [f"program {number}"]
         for _line in _lines(board, number, *_image()[1][number], is_exact=core == "exact"):
-            lines.append(f"{board.chip.engine.shared.logged} {sorted(counts.items())}")
+            shared = board.chip.engine.shared
+            accesses = f"{shared.access_cycle} {shared.access_pc:x} {shared.exact_stops}"
+            lines.append(f"{shared.logged} {accesses} {sorted(counts.items())}")
             counts.clear()
         yield "\n".join(lines)
 

@@ -384,6 +384,17 @@ def _port_write(w: RegisterWalker) -> None:
     w.write(f"GPIO{port}.{register}", w.number(1 << 32) if register == "BSRR" else w.number(1 << 16))
 
 
+def _port_driven(w: RegisterWalker) -> None:
+    """An output, and then an alternate function's, which somebody outside drives too."""
+    port, number = w.pick("AB"), 1 + w.number(7)
+    w.drive(f"P{port}{number}", w.pick((False, True)))
+    for mode in (0x3333_3333, 0xBBBB_BBBB):
+        w.write(f"GPIO{port}.CRL", mode)
+        for level in (0, 16, 0):
+            w.write(f"GPIO{port}.BSRR", 1 << number + level)
+    w.drive(f"P{port}{number}", None)
+
+
 def _port_lock(w: RegisterWalker) -> None:
     name, pins = f"GPIO{w.pick('ABC')}.LCKR", w.number(1 << 16)
     wrong, cut = w.pick((0, 0, 0, 0, 1, 2, 3)), w.pick((0, 0, 0, 0, 2, 3))
@@ -417,7 +428,7 @@ def _port_remap(w: RegisterWalker) -> None:
 def _ports(name: str, *parts: str) -> RegisterWalk:
     return RegisterWalk(
         name=name, parts=(name, *parts), begin=_port_begin,
-        moves=(_port_pin, _port_pin, _port_write, _port_lock, _port_exti, _port_remap, _port_wait),
+        moves=(_port_pin, _port_pin, _port_write, _port_lock, _port_exti, _port_remap, _port_wait, _port_driven),
         spans_ns=(125, 1_000), at_random=30, episodes=22,
     )  # fmt: skip
 

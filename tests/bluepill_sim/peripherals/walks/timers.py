@@ -90,6 +90,17 @@ def _tim(number: int) -> RegisterWalk:  # noqa: C901, PLR0915 - a function a mov
             w.run(w.pick((6_000, 11_000, 20_125)))
             w.write(f"{name}.CCR{n}", w.pick((0, 3, 10, 20, 30, 39, 40, 50)))
 
+    def preload(w: RegisterWalker) -> None:
+        """Write a compare value that waits for the update event: others, and the one that is active."""
+        n, active = 1 + w.number(4), w.pick((0, 1, 6, 7))
+        w.write(f"{name}.CCMR{(n + 1) // 2}", w.pick((0x6868, 0x6868, 0x7878, 0x6860, 0x6968)))
+        w.write(f"{name}.ARR", 39)
+        w.turn(f"{name}.CR1", on=1)
+        w.write(f"{name}.CCR{n}", active)
+        w.write(f"{name}.EGR", 1)
+        for change in (3, *(w.pick((0, 1, 2, 0x1_0000, 0x1_0003)) for _ in range(4))):
+            w.write(f"{name}.CCR{n}", active ^ change)
+
     def compare(w: RegisterWalker) -> None:
         w.write(f"{name}.CCR{1 + w.number(4)}", w.number(40))
 
@@ -118,7 +129,7 @@ def _tim(number: int) -> RegisterWalk:  # noqa: C901, PLR0915 - a function a mov
                 other_register = w.pick(("BDTR", "DIER", "SR") if number == 1 else ("DIER", "SR", "CR2"))
                 w.write(f"{name}.{other_register}", w.look(f"{name}.{other_register}"))
 
-    moves = (pin, pin, glitch, glitch, compare, clear, clear, generate, shape, shape, duty, burst)
+    moves = (pin, pin, glitch, glitch, compare, clear, clear, generate, shape, shape, duty, burst, preload)
     return RegisterWalk(
         name=name, parts=(name, "DMA1"), begin=begin, remaps=_TIM_REMAPS[number],
         moves=(*moves, crystal) if number == 1 else moves,
@@ -181,6 +192,24 @@ def _adc_trigger(w: RegisterWalker) -> None:
     w.write("EXTI.SWIER", w.pick((1 << 11, 1 << 15)))
 
 
+def _adc_in_parts(w: RegisterWalker) -> None:
+    """Start a sequence part by part, which may become shorter under way, or go on as a whole."""
+    name = w.pick(("ADC1", "ADC2"))
+    discontinuous, start = w.pick(((0x1000, _JSWSTART), (0x1000, _JSWSTART), (0x800, _SWSTART)))
+    w.turn(f"{name}.CR1", on=discontinuous, off=0x400)
+    w.turn(f"{name}.CR2", on=1 | 7 << 17 | 7 << 12 | _EXTTRIG | _JEXTTRIG, off=2)
+    for _ in range(3 + w.number(4)):
+        w.turn(f"{name}.CR2", on=start)
+        w.run(w.pick((5_000, 70_000, 70_000)))
+        if not w.number(3):
+            w.write(f"{name}.JSQR", w.number(4) << 20 | w.number(5) << 15 | w.number(5) << 10)
+            w.write(f"{name}.SQR1", w.number(4) << 20)
+        if not w.number(4):
+            w.turn(f"{name}.CR1", off=discontinuous)
+    for register in ("JDR1", "JDR2", "JDR3", "JDR4", "SR"):
+        w.read(f"{name}.{register}")
+
+
 def _adc_calibrate(w: RegisterWalker) -> None:
     name = w.pick(("ADC1", "ADC2"))
     w.turn(f"{name}.CR2", on=w.pick((8, 4, 4, 1)), off=w.pick((0, 1, 2)))
@@ -201,7 +230,8 @@ def _adc_pin(w: RegisterWalker) -> None:
 
 _ADC = RegisterWalk(
     name="ADC", parts=("ADC1", "ADC2", "DMA1"), begin=_adc_begin,
-    moves=(_adc_start, _adc_start, _adc_start, _adc_trigger, _adc_take, _adc_take, _adc_calibrate, _adc_pin),
+    moves=(_adc_start, _adc_start, _adc_start, _adc_trigger, _adc_take, _adc_take, _adc_calibrate, _adc_pin,
+           _adc_in_parts),
     spans_ns=(125, 1_000, 3_500, 7_000, 14_000, 30_000, 100_000), beside=("TIM1",), at_random=18, episodes=36,
 )  # fmt: skip
 

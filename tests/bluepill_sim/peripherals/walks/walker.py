@@ -3,19 +3,23 @@
 Theory of operation. A walk has episodes. Each begins on a board out of reset, whose core sleeps, sets the peripheral up
 in a mode, each in turn, and goes some steps at random: what the mode expects (a word, a START, a call from outside),
 registers at random, time. What a step did is a line: what was done and read, which registers are otherwise than before,
-edges and words that came out, lines inside the chip, when a part acts next, warnings, resets. In the middle of each
-episode the board is saved and another one goes on from there, which no line may show.
+and what a device in C holds beside them; edges and words that came out, lines inside the chip, waves that are offered,
+when a part acts next, warnings, resets, what C called Python for and how often. In the middle of each episode the board
+is saved and another one goes on from there, which no line may show.
 
 Every other episode has somebody who looks at the pins: models that talk in words make their edges only then. In every
 third a program makes the accesses, which comes to each in the middle of a block: models see such a one at its time only
-where they say that it matters.
+where they say that it matters; then the line has its cycle.
 
 Invariant: an episode follows from its name alone, on every version of Python.
 """
 
+import ctypes
 import random
+import re
 import struct
 import zlib
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
@@ -25,11 +29,12 @@ from bluepill_sim import BluePill
 from bluepill_sim.core.unicorn_core import Reg
 from bluepill_sim.fabric.fabric import OWN_COMMANDS
 from bluepill_sim.fabric.pins import PinDrive
-from bluepill_sim.fabric.registers import WORD, Register, fields_of
+from bluepill_sim.fabric.registers import OWN_ANSWERS, WORD, Register, fields_of
 from bluepill_sim.fabric.subscriptions import EDGE, Of, read_rows
 from bluepill_sim.parts import CanNetwork, CanNode
 from bluepill_sim.peripherals.spi import Loopback
 from simbase.state import Stateful
+from tests.bluepill_sim.core.walks.counted_calls import counted_calls
 from tests.bluepill_sim.machine import Machine
 
 #: SRAM that DMA reads and writes: the last bytes of it are in the trace, as a checksum.
@@ -47,6 +52,8 @@ _MEMORY = "PMA_"
 _EXPECTED = 0xFF
 #: The frequencies in a trace.
 _CLOCKS = ("hclk_hz", "pclk1_hz", "pclk2_hz", "timer1_hz", "timer2_hz", "usb_hz", "adc_divider", "rtcclk_hz")
+#: What C calls Python for by what other episodes had it keep: blocks, and parts that hear pins, and act then.
+_OF_OTHERS = ("unknown_block", "event", f"/{OWN_ANSWERS - 1}")
 #: What no device knows.
 _NO_COMMAND = OWN_COMMANDS + 99
 #: Words of a part that has no memory of packets.
@@ -63,6 +70,8 @@ _PROGRAM, _HALFWORD_AT = 0x2000_0800, 2
 _WAIT = (0x3801, 0xD1FD, 0x46C0, 0x46C0)
 _SLEEP = (0xBF30, 0xE7FD)
 _ACCESSES = {"load": 0x680A, 4: 0x600A, 2: 0x800A, 1: 0x700A}
+#: Where in that program it was warned: of an access that needs no time, where its block begins, or one before it.
+_PLACE = re.compile(r" at 0x200008[0-9a-f]{2}\b")
 #: Most rounds, and how long a program has: some accesses never end.
 _MOST_ROUNDS, _PROGRAM_NS, _STEP_NS = 24, 40_000, 2_500
 
@@ -192,7 +201,9 @@ class WalkedBoard:
     """A board whose core sleeps, with something at each of its buses; and what was heard of it."""
 
     def __init__(self, *, is_alone: bool) -> None:
-        self.board = Machine("sleep: wfi\nb sleep", {}).deafen().board
+        self.calls = Counter[str]()
+        with counted_calls(self.calls):
+            self.board = Machine("sleep: wfi\nb sleep", {}).deafen().board
         self.network, self.node = CanNetwork(), CanNode()
         self.network.join(self.node)
         if not is_alone:
@@ -250,6 +261,7 @@ class WalkedBoard:
         for name, port in board.serial_ports.items():
             self._closing.append(port.subscribe(self._take_rows(name)))
         self.heard.clear()
+        self.calls.clear()
 
     def _take_edges(self, rows: bytes) -> None:
         self.heard += [
@@ -274,6 +286,27 @@ def _plain(value: object) -> object:
 def boards(*, is_alone: bool) -> tuple[WalkedBoard, WalkedBoard]:
     """Return the board on which episodes begin, and the one on which they go on."""
     return WalkedBoard(is_alone=is_alone), WalkedBoard(is_alone=is_alone)
+
+
+@cache
+def _gaps(kind: Any) -> int:
+    """Return a struct's bytes as a number, all ones where a field of it stands."""
+    if not hasattr(kind, "_fields_"):
+        inner: Any = getattr(kind, "_type_", None)
+        count = int(getattr(kind, "_length_", 1))
+        if not hasattr(inner, "_fields_"):
+            return int((1 << 8 * ctypes.sizeof(kind)) - 1)
+        return sum(_gaps(inner) << 8 * ctypes.sizeof(inner) * n for n in range(count))
+    return sum(_gaps(field[1]) << 8 * getattr(kind, field[0]).offset for field in kind._fields_)
+
+
+def _without_gaps(struct_held: Any) -> int:
+    """Return a checksum of a struct; between its fields a compiler writes what it likes."""
+    kind: Any = type(struct_held)
+    held, meant = bytes(struct_held), _gaps(kind)
+    if meant.bit_count() == 8 * len(held):  # there are none
+        return zlib.crc32(held)
+    return zlib.crc32((int.from_bytes(held, "little") & meant).to_bytes(len(held), "little"))
 
 
 @cache
@@ -368,15 +401,19 @@ class RegisterWalker:
     def _accessed(self, access: object, address: int, value: int = 0) -> int | None:
         """Have a program make an access; return what R2 is then; nothing where the core does not sleep before it."""
         board = self.board
-        engine, end_ns = board.chip.engine, board.now_ns + _PROGRAM_NS
+        engine: Any = board.chip.engine
+        end_ns, shared = board.now_ns + _PROGRAM_NS, engine.shared
         if not board.is_asleep:
             return None
+        shared.access_cycle = 0
         for register, word in ((Reg.R0, 1 + self.number(_MOST_ROUNDS)), (Reg.R1, address), (Reg.R2, value)):
             engine.registers[register] = word
         engine.jump(self._now.entries[access] | 1)
         board.chip.processor.wake()
         while not board.is_asleep and board.now_ns < end_ns:
             board.advance_to(min(board.now_ns + _STEP_NS, end_ns))
+        if shared.access_cycle:  # the core has worked it out, since the part needs it
+            self.note(f"in cycle {shared.access_cycle}")
         return int(engine.registers[Reg.R2])
 
     def attempt(self, act: Callable[[], object]) -> None:
@@ -536,11 +573,14 @@ class RegisterWalker:
         """Have the other board go on from here."""
         self._other.go_on_from(self._now.saved())
         self._now, self._other = self._other, self._now
+        self._now.calls.clear()
 
     def _step(self, act: Callable[[], None]) -> None:
         self._done.clear()
         act()
         self.board.chip.deliver()
+        counts = sorted(self._now.calls.items())
+        calls = " ".join(f"{name} {count}" for name, count in counts if not name.endswith(_OF_OTHERS))
         now = dict(self._all())
         changed = [
             f"{name} {value:#x}" if isinstance(value, int) else f"{name} {value}"
@@ -550,8 +590,9 @@ class RegisterWalker:
         heard = self._now.heard
         if len(heard) > _SHOWN:
             heard[_SHOWN:] = [f"and {len(heard) - _SHOWN} more: {zlib.crc32(' '.join(heard).encode()):08x}"]
-        self.lines.append(f"{' '.join(self._done)} | {', '.join(changed)} | {' '.join(heard)}".rstrip(" |"))
+        self.lines.append(f"{' '.join(self._done)} | {', '.join(changed)} | {' '.join(heard)} | {calls}".rstrip(" |"))
         heard.clear()
+        self._now.calls.clear()
 
     def _all(self) -> Iterator[tuple[str, object]]:
         """Go through all that can be seen now; of parts that hold what they held, what only they can say."""
@@ -566,6 +607,8 @@ class RegisterWalker:
             if len(words) > _USUAL_WORDS and not is_same:
                 yield f"{name} memory", zlib.crc32(memoryview(words)[_USUAL_WORDS:])
             yield f"{name} acts", part.due_ns
+            if part.native is not None:
+                yield f"{name} holds", f"{_without_gaps(part.native):08x}"
         lines = board.chip.pins.fabric.lines
         yield "lines", " ".join(str(n) for n, level in enumerate(lines) if level)
         yield "pending", board.chip.processor.nvic.pending
@@ -576,9 +619,10 @@ class RegisterWalker:
             self._drives = "".join(_LETTERS[pin.output] for pin in board.pins)
         yield "wires", self._wires
         yield "drives", self._drives
+        yield "waves", f"{_without_gaps(board.chip.pins.fabric.wave_structs):08x}"
         yield "routes", " ".join(f"{name} {route}" for name, route in board.chip.pins.remaps.items() if route)
         yield "memory", zlib.crc32(board.read_memory(BUFFER, BUFFER_BYTES) or b"")
-        yield "warnings", " / ".join(board.warnings)
+        yield "warnings", _PLACE.sub("", " / ".join(board.warnings))
         yield "resets", " ".join(f"{cause.name} {count}" for cause, count in board.resets.items())
         clocks = board.chip.clocks
         yield "clocks", " ".join(str(getattr(clocks, name)) for name in _CLOCKS)
