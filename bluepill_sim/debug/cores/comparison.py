@@ -89,7 +89,7 @@ def values_apart(boards: Boards) -> tuple[CoreValue, ...]:
     rows += [("PC", boards[0].pc, boards[1].pc), ("cycle", boards[0].cycle, boards[1].cycle)]
     found = [core_value(name, one, other) for name, one, other in rows if one != other]
     seen = [_flat(board) for board in boards]
-    for name in [*seen[0], *(seen[1].keys() - seen[0].keys())]:
+    for name in seen[0] | seen[1]:
         values = [each.get(name) for each in seen]
         if values[0] != values[1]:
             found.append(core_value(name, *values))
