@@ -127,8 +127,9 @@ def _boundaries(_: random.Random) -> Iterator[str]:
     for end_ns in (1, 40_000, MS + 1):
         boards = _board("own"), _board("python")
         yield f"{said(compare_boundaries(boards, end_ns, high))} {[board.pin('PA0').level for board in boards]}"
-    for source in ("udf\ntick: nop\ncall: nop", "bkpt #1\ntick: nop\ncall: nop"):
-        yield said(compare_boundaries((_board("own", source), _board("python", source)), MS))
+    for first in ("udf", "bkpt #1", "cpsid f\nudf"):
+        source = f"{first}\ntick: nop\ncall: nop"
+        yield said(compare_boundaries((_board("own", source), _board("python", source)), 3 * MS))
     boards = _board("own"), _board("python")
     for end_ns in (1_000, 9_000):
         boards[end_ns // 9_000].advance_to(end_ns)
