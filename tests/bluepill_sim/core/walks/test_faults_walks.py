@@ -19,8 +19,8 @@ from tests.tools.suite.approved import judge_alike, judge_of
 PROGRAMS, SPANS_NS = 48, (1_500, 9_000, 60_000)
 #: The cores that go from block to block, and so show the same.
 CORES = ("native", "python", "own")
-_VTOR, _ICSR, _AIRCR, _CCR, _SHPR1, _SHCSR, _STIR = (
-    0xE000_ED08, 0xE000_ED04, 0xE000_ED0C, 0xE000_ED14, 0xE000_ED18, 0xE000_ED24, 0xE000_EF00,
+_VTOR, _ICSR, _AIRCR, _SCR, _CCR, _SHPR1, _SHCSR, _STIR = (
+    0xE000_ED08, 0xE000_ED04, 0xE000_ED0C, 0xE000_ED10, 0xE000_ED14, 0xE000_ED18, 0xE000_ED24, 0xE000_EF00,
 )  # fmt: skip
 #: A vector table whose last vectors are behind the SRAM, and one where nothing is.
 _SHORT_TABLE, _NO_TABLE = 0x2000_4FD0, 0x3000_0000
@@ -62,7 +62,7 @@ _BEFORE = (
     "", "", "", "cpsid i\n", "cpsid f\n", "movs r0, #64\nmsr basepri, r0\n", "movs r0, #1\nmsr control, r0\nisb\n",
     "mov32 r0, #0x20000010\nmov sp, r0\n", "mov32 r0, #0x20004FFC\nmov sp, r0\n",
     "mov32 r0, #0x20000804\nmsr psp, r0\nmovs r0, #2\nmsr control, r0\nisb\n", f"{store(_VTOR, _SHORT_TABLE)}dsb\n",
-    f"{store(_VTOR, _NO_TABLE)}dsb\n", store(_AIRCR, 0x05FA_0000 | 5 << 8),
+    f"{store(_VTOR, _NO_TABLE)}dsb\n", store(_AIRCR, 0x05FA_0000 | 5 << 8), store(_SCR, 0x12), store(_SCR, 6),
 )  # fmt: skip
 #: What fails, or asks for an exception.
 _FAULTS = (
@@ -70,6 +70,7 @@ _FAULTS = (
     "svc #3", "svc #3", store(_ICSR, 1 << 28), store(_ICSR, 1 << 31), store(_ICSR, 1 << 26), store(_STIR, 7),
     "bkpt #1", "mov32 r1, #0x60000000\nstr r0, [r1, #0]\nldr r0, [r1, #0]", "push {r0-r3}\npop {r0-r3}\nsvc #0",
     "movs r0, #1\nmsr faultmask, r0\nsvc #0", store(_SHCSR, 0x1FFFF), store(_AIRCR, 0x05FA_0001),
+    "sev\nwfe", "wfe", "sev\nwfi", f"cpsid i\n{store(_ICSR, 1 << 28)}wfi\ncpsie i",
 )  # fmt: skip
 
 
