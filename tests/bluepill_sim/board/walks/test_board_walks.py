@@ -157,38 +157,5 @@ def conditions(_draw: random.Random) -> Iterator[str]:
         yield tried(lambda select: type(board.spi("SPI1", None, select=select)).__name__, select)
 
 
-#: The ends of flash, of its alias at 0, of the option bytes and of system memory.
-PROGRAMMED = (
-    0, 0x1_FFFC, 0x1_FFFE, 0x2_0000, 0x07FF_FFFE, 0x0800_0000, 0x0800_0001, 0x0801_FFFC, 0x0801_FFFE, 0x0801_FFFF,
-    0x0802_0000, 0x1FFF_F7FE, 0x1FFF_F800, 0x1FFF_F80C, 0x1FFF_F80E, 0x1FFF_F810,
-)  # fmt: skip
-
-
-def programmed(_draw: random.Random) -> Iterator[str]:
-    """Yield what becomes of stores to flash and option bytes, near the ends of each, one by one and at once."""
-    chip = Machine(FLIPS, {}).deafen().board.chip
-    for key in (0x4567_0123, 0xCDEF_89AB):
-        for offset in (4, 8):
-            chip.parts.flash.write(offset, 4, key)
-    chip.memory.load_flash(0, b"\xff" * len(chip.memory.flash))
-    for control in (0x201, 0x210):
-        chip.parts.flash.write(16, 4, control)
-        fresh = chip.snapshot()
-        for address in PROGRAMMED:
-            row = list[object]()
-            for size in (1, 2, 4):
-                chip.restore(fresh)
-                row += [
-                    tried(chip._write_flash, address, size, 0x5AA5_A55A & (1 << 8 * size) - 1),
-                    list(chip._flash_repairs),
-                ]
-                chip._repair_flash()
-                row.append(sum(chip.memory.flash.raw) - sum(chip.memory.options))
-                for pc, stop_at in ((0x0800_0200, 421), (0x0800_0200, 420), (0x1FFF_EFFE, 999), (0x1FFF_F000, 999)):
-                    chip.restore(fresh)
-                    row.append(tried(chip._program_at_once, address, size, pc, chip.engine.cycle, stop_at))
-            yield f"{control:x} {address:x} {said(row)}"
-
-
-TRACES: dict[str, Trace] = {"faults": faults, "lives": lives, "conditions": conditions, "programmed": programmed}
+TRACES: dict[str, Trace] = {"faults": faults, "lives": lives, "conditions": conditions}
 test_a_walk_shows_what_was_approved = judge_of(__file__, TRACES)

@@ -13,7 +13,7 @@ from bluepill_sim import BluePill
 from bluepill_sim.cli.comparisons import compare_cores
 from bluepill_sim.core import Reg
 from bluepill_sim.core.unicorn_core import GENERAL
-from bluepill_sim.debug.cores.comparison import Acts, CoreDifference, CoreValue, compare_boundaries, values_apart
+from bluepill_sim.debug.cores.comparison import Acts, CoreValue, compare_boundaries, values_apart
 from bluepill_sim.debug.cores.judge import UnicornJudge, compare_instructions
 from bluepill_sim.extension.library import core_chosen
 from bluepill_sim.program.image import Image
@@ -137,11 +137,6 @@ def _boundaries(_: random.Random) -> Iterator[str]:
     for board, words in zip(boards, ("odd", "even"), strict=True):
         board.chip.warn(words, once=words)
     yield said([[one.name, one.one, one.other] for one in values_apart(boards)[-4:]])
-    for count in (0, 1, 12, 13, 15):
-        values = tuple(CoreValue(name=f"R{n}", one=f"{n}", other="0") for n in range(count))
-        made = CoreDifference(at_ns=7, cycle=9, address=FLASH + 0x131, is_instruction=False, values=values)
-        with patch.object(compare_cores, "read_lines", lambda _image: _LINES):
-            yield "\n".join(compare_cores.lines_of(boards[0], "python", made))
     dice, boards = random.Random("boundaries"), (_board("own"), _board("python"))
     for _number in range(20):
         yield f"{_disturb(boards[dice.randrange(2)], dice)} {_values(values_apart(boards))}"
