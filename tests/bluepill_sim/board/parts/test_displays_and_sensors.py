@@ -318,7 +318,7 @@ def test_a_fix_has_the_date_of_its_time(start: str, at_s: int, date: str) -> Non
     assert checked(Gps(start=start).sentences(BoardMotion(), at_s * 10**9)[1])[9] == date
 
 
-@pytest.mark.parametrize("year", [1, 2000, 2036, 2069, 2099])
+@pytest.mark.parametrize("year", [2000, 2036, 2069])
 def test_every_day_of_a_year_has_its_date(year: int) -> None:
     gps = Gps(start=f"{year:04d}-01-01T23:59:58")
     for day in range(366):

@@ -1,6 +1,7 @@
 """What a chip does with stores near the ends of flash, and what it warns of, as approved."""
 
 import random
+import zlib
 from collections.abc import Iterator
 
 from tests.bluepill_sim.board.walks.test_board_walks import FLIPS
@@ -12,6 +13,10 @@ PROGRAMMED = (
     0, 0x1_FFFC, 0x1_FFFE, 0x2_0000, 0x07FF_FFFE, 0x0800_0000, 0x0800_0001, 0x0801_FFFC, 0x0801_FFFE, 0x0801_FFFF,
     0x0802_0000, 0x1FFF_F7FE, 0x1FFF_F800, 0x1FFF_F80C, 0x1FFF_F80E, 0x1FFF_F810,
 )  # fmt: skip
+
+
+#: Where code is that programs flash, and the cycle at which something else is due.
+CODES, HALFWORD = ((0x0800_0200, 421), (0x0800_0200, 420), (0x1FFF_EFFE, 999), (0x1FFF_F000, 999)), 2
 
 
 def programmed(_draw: random.Random) -> Iterator[str]:
@@ -33,15 +38,15 @@ def programmed(_draw: random.Random) -> Iterator[str]:
                     list(chip._flash_repairs),
                 ]
                 chip._repair_flash()
-                row.append(sum(chip.memory.flash.raw) - sum(chip.memory.options))
-                for pc, stop_at in ((0x0800_0200, 421), (0x0800_0200, 420), (0x1FFF_EFFE, 999), (0x1FFF_F000, 999)):
+                row += [zlib.crc32(chip.memory.flash.raw), zlib.crc32(chip.memory.options)]
+                for pc, stop_at in CODES if size == HALFWORD else CODES[:1]:
                     chip.restore(fresh)
                     row.append(tried(chip._program_at_once, address, size, pc, chip.engine.cycle, stop_at))
             yield f"{control:x} {address:x} {said(row)}"
 
 
-#: DEMCR has TRCENA, without which the DWT does nothing.
-TRACES_ON = "mov32 r0, #0xE000EDFC\nmov32 r1, #0x01000000\nstr r1, [r0, #0]\n"
+#: DEMCR has TRCENA and MON_EN, without which nobody looks at what FPB and DWT want.
+TRACES_ON = "mov32 r0, #0xE000EDFC\nmov32 r1, #0x01010000\nstr r1, [r0, #0]\n"
 #: What is not modelled, or asks too much: words of the private peripheral bus, of peripherals, and of no device.
 ODD_STORES = (
     (0xE000_EDFC, 0x0100_0000), (0xE000_1028, 0x104), (0xE000_1028, 0xF), (0xE000_2000, 3), (0xE000_2008, 0xC000_0001),

@@ -158,7 +158,7 @@ def lines_of(draw: random.Random, calls: list[str], count: int) -> list[Given | 
 
 def served(draw: random.Random) -> Iterator[str]:
     """Serve debuggers one after the other at a machine that only they run."""
-    for turn in range(18):
+    for turn in range(13):
         calls: list[str] = []
         written, board = WrittenTime(calls), Machine(PROGRAM, {}).deafen().board
         listener = WrittenLine(calls, "port", lines_of(draw, calls, 4))

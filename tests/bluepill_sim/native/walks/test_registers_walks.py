@@ -35,7 +35,7 @@ def _accessed(board: BluePill, width: int, address: int) -> None:
 
 
 def left(_: random.Random) -> Iterator[str]:
-    """Yield, by part, which registers' loads and stores C asks Python about, the first time and later."""
+    """Yield, by kind of part, which registers' loads and stores C asks Python about, the first time and later."""
     with core_chosen("native"):
         board = Machine("sleep: wfi\nb sleep", {}).deafen().board
     for width, (load, store) in ACCESSES.items():
@@ -44,7 +44,8 @@ def left(_: random.Random) -> Iterator[str]:
         board.chip.parts.rcc.write(register, 4, word)
     board.run_for("9 us")
     fresh, counts = board.snapshot(), asked(board)
-    for name, part in board.chip.parts.by_name.items():
+    kinds = {type(part): part for part in reversed(board.chip.parts.by_name.values())}
+    for part in reversed(kinds.values()):
         rows: list[str] = []
         for register in part.REGISTERS:
             if register.name.startswith("PMA_") and register.offset % 0x80:
@@ -56,7 +57,7 @@ def left(_: random.Random) -> Iterator[str]:
                 row = "".join(f"{kind[0]}{count}" for (kind, _address), count in counts.items())
                 rows.append(row or ("-" if board.is_asleep else "never"))
                 counts.clear()
-        yield f"{name}: {' '.join(rows)}"
+        yield f"{part.name}: {' '.join(rows)}"
 
 
 #: What asks for memory in C, by who calls it: what it returns where there is none.
