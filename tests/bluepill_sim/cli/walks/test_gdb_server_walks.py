@@ -47,8 +47,8 @@ Given = bytes | Exception | None
 class WrittenTime:
     """Connections, `select` and the clock of a server, all of them written down."""
 
-    def __init__(self, calls: list[str]) -> None:
-        self.calls, self.now_ns = calls, 10**9
+    def __init__(self, calls: list[str], reading_ns: int = 10_000) -> None:
+        self.calls, self.now_ns, self._reading_ns = calls, 10**9, reading_ns
 
     def select(self, ready: Sequence["WrittenLine"], _: object, __: object, wait_s: float) -> tuple[list[object], ...]:
         """Return what may be read; the time passes where that is nothing."""
@@ -60,8 +60,8 @@ class WrittenTime:
         return ([one] if is_ready else []), [], []
 
     def monotonic_ns(self) -> int:
-        """Return the time; a reading takes 10 us."""
-        self.now_ns += 10_000
+        """Return the time; a reading takes some, too."""
+        self.now_ns += self._reading_ns
         return self.now_ns
 
 
@@ -150,6 +150,8 @@ def lines_of(draw: random.Random, calls: list[str], count: int) -> list[Given | 
         ends: list[Given] = [b"\x03", b"\x03", frame(draw.choice(LEAVES))]
         ways: tuple[list[Given], ...] = ([b""], [FAILURES[1]], [FAILURES[2]], [FAILURES[0], b""], ends, ends)
         given += draw.choice(ways)
+        if draw.random() < 0.15:  # a browser shows itself by its first bytes
+            given = [FAILURES[1]]
         made = WrittenLine(calls, f"line {number}", [*given, b"", b""])
         made.is_broken = draw.random() < 0.1
         found += [QUIET] * draw.randrange(2) + [made]
@@ -160,7 +162,7 @@ def served(draw: random.Random) -> Iterator[str]:
     """Serve debuggers one after the other at a machine that only they run."""
     for turn in range(13):
         calls: list[str] = []
-        written, board = WrittenTime(calls), Machine(PROGRAM, {}).deafen().board
+        written, board = WrittenTime(calls, 3_000_000 if turn % 4 == 2 else 10_000), Machine(PROGRAM, {}).deafen().board
         listener = WrittenLine(calls, "port", lines_of(draw, calls, 4))
         with (
             patch.object(gdb_server, "select", written),

@@ -49,6 +49,8 @@ bx lr
 clears: movs r1, #0
 str r1, [sp, #28]
 bx lr
+masks: cpsid f
+bx lr
 wakes: movs r0, #0
 msr faultmask, r0
 msr basepri, r0
@@ -72,13 +74,20 @@ _FAULTS = (
     "movs r0, #1\nmsr faultmask, r0\nsvc #0", store(_SHCSR, 0x1FFFF), store(_AIRCR, 0x05FA_0001),
     "sev\nwfe", "wfe", "sev\nwfi", f"cpsid i\n{store(_ICSR, 1 << 28)}wfi\ncpsie i",
 )  # fmt: skip
+#: Handlers in handlers, and FAULTMASK that a return clears, but for NMI's.
+_NESTED: tuple[tuple[str, dict[int, str | int]], ...] = (
+    *(("svc #1", {11: "fails", 3: name}) for name in ("wrong", "other", "skips", "clears", "returns", "masks")),
+    ("svc #1", {11: "masks"}), ("udf", {3: "masks"}), (store(_ICSR, 1 << 31), {2: "masks"}),
+    (store(_ICSR, 1 << 31), {2: "fails", 3: "skips"}), (store(_ICSR, 1 << 31), {2: "wrong", 3: "skips"}),
+    (store(_ICSR, 1 << 28), {14: "calls", 11: "returns", 3: "skips"}),
+)  # fmt: skip
 
 
 @cache
 def _program(number: int) -> tuple[bytes, str]:
     """Return a program as it stands in flash, and what it is in words."""
     dice = random.Random(f"faults {number}")
-    vectors = {
+    vectors: dict[int, str | int] = {
         place: dice.choice(_BAD) if dice.random() < 0.06 else dice.choice(_NAMES)
         for place in (2, 3, 4, 5, 6, 11, 12, 14, 15, 23) if dice.random() < 0.8
     }  # fmt: skip
@@ -89,6 +98,8 @@ def _program(number: int) -> tuple[bytes, str]:
         store(0xE000_E100, 0x80),
     ]
     picked = [dice.choice(_BEFORE)] + [dice.choice(_FAULTS) for _ in range(dice.choice((1, 2, 3)))]
+    if number < len(_NESTED):
+        setup, picked, vectors = [], [_NESTED[number][0]], _NESTED[number][1]
     body = "\n".join(f"{one.format(f't{n}')}\nadds r{n + 3}, #1" for n, one in enumerate(_bracketed(picked)))
     made = Assembler(f"{''.join(setup)}{body}\nstop: b stop\n{HANDLERS}", CODE)
     table = [STACK, CODE | 1, *[made.labels["stop"] | 1] * (VECTORS - 2)]
