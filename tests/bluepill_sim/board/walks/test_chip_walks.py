@@ -65,5 +65,15 @@ def warned(_draw: random.Random) -> Iterator[str]:
         yield said([f"{address:x}", board.warnings, str(board.fault), board.register("R2"), board.cycle])
 
 
-TRACES: dict[str, Trace] = {"programmed": programmed, "warned": warned}
+def frozen(_draw: random.Random) -> Iterator[str]:
+    """Yield which parts each bit of DBGMCU_CR freezes at a halt, where the clocks go on and in Stop."""
+    chip = Machine("nop", {}).deafen().board.chip
+    for is_stopped in (False, True):
+        chip.power.is_stopped = is_stopped
+        for word in (0, *(1 << n for n in range(32)), 0xFFFF_FFFF):
+            chip.system._dbgmcu_cr = word
+            yield f"{is_stopped} {word:x} {[part.name for part in chip._frozen_parts()]}"
+
+
+TRACES: dict[str, Trace] = {"programmed": programmed, "warned": warned, "frozen": frozen}
 test_a_walk_shows_what_was_approved = judge_of(__file__, TRACES)
