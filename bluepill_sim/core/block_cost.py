@@ -89,7 +89,7 @@ class BasicBlock:
         # It has an IT instruction at least in so far as it may begin inside an IT block.
         return BasicBlock(
             address, self.end, self.straight - done, self.taken - done, offsets,
-            has_it=True, it_states=self.it_states, last=self.last,
+            divides=self.divides, aligned=self.aligned, has_it=True, it_states=self.it_states, last=self.last,
         )  # fmt: skip
 
     @property

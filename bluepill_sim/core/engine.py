@@ -211,7 +211,7 @@ class Engine(Stateful):
         return LastRows()
 
     def _make_traps(self) -> "Traps":
-        return Traps(self._core, self.stop_before, self._leave_it_block)
+        return Traps(self._core, self.stop_before, self._leave_it_block, lambda: self.block)
 
     def _install_hooks(self) -> tuple[int, ...]:
         """Hook blocks and what ends a run; return the hooks but that of the blocks."""
@@ -725,12 +725,17 @@ class Traps:
 
     A block that has such instructions is translated again with the hooks, the first
     time that it is entered; one in `_armed` was translated with its hooks in place.
+    Code that is replaced keeps them.
     """
 
-    def __init__(self, core: UnicornCore, stop_before: StopBefore, leave_it_block: Callable[[], object]) -> None:
+    def __init__(
+        self, core: UnicornCore, stop_before: StopBefore, leave_it_block: Callable[[], object],
+        running: Callable[[], BasicBlock],
+    ) -> None:  # fmt: skip
         self._core = core
         self._stop_before = stop_before
         self._leave_it_block = leave_it_block
+        self._running = running
         #: What is wanted.
         self._division = self._unaligned = False
         #: Whether that has changed since the last run.
@@ -784,6 +789,15 @@ class Traps:
         """Return the divisions to look at: all while the trap is on, else those that may come just after its switch."""
         return block.divides if self._division else block.late_divides
 
+    def may_trap(self, kind: HaltKind, address: int, value: int) -> bool:
+        """Tell whether the running block has such an instruction at an address, with this value in its register.
+
+        Hooks stay where code was replaced: what stands there now may be something else.
+        """
+        block = self._running()
+        rows = block.aligned if kind is HaltKind.UNALIGNED else block.divides
+        return any(at == address and self._core.registers[GENERAL[number]] == value for at, number in rows)
+
     def _watch_alignment(self, _access: int, address: int, size: int, _value: int) -> bool:
         if self._unaligned and address % size:
             self._stop_before(HaltKind.UNALIGNED, self._core.registers[Reg.PC], address)
@@ -800,11 +814,12 @@ class Traps:
 
         def look_at_base() -> None:
             value = self._core.registers[register]
-            if value & 3:
+            if value & 3 and self.may_trap(kind, address, value):
                 self._stop_before(kind, address, value)
 
         def look_at_divisor() -> None:
-            if self._division and not self._core.registers[register]:
+            value = self._core.registers[register]
+            if self._division and not value and self.may_trap(kind, address, value):
                 self._stop_before(kind, address, None)
 
         self._core.on_instruction(address, look_at_base if kind is HaltKind.UNALIGNED else look_at_divisor)

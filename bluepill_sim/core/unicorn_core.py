@@ -103,6 +103,8 @@ SCRATCH_END = SCRATCH_BASE + len(_SCRATCH_CODE)
 _ARCHITECTURE_ARM, _MODE_THUMB, _MODEL_CORTEX_M3 = 1, 16, 8
 _HOOK_INTERRUPT, _HOOK_CODE, _HOOK_BLOCK, _HOOK_INVALID = 1, 4, 8, 0x4000
 _HOOK_ACCESS, _HOOK_BAD_ACCESS, _HOOK_TLB_FILL = 0x400 | 0x800, 0x3F0, 0x20000
+#: First and last address of a hook that is called everywhere: the first is behind the last.
+EVERYWHERE = 1, 0
 _NATIVE_HOOKS = {
     "block": _HOOK_BLOCK,
     "instruction": _HOOK_CODE,
@@ -293,7 +295,7 @@ class UnicornCore(Stateful):
 
     def on_block(self, call: Callable[[int, int, int, int], None]) -> int:
         """Call (uc, address, size, user) before each basic block; the callback must not raise; return the hook."""
-        return self._hook(_HOOK_BLOCK, self._pointer(BLOCK_CALLBACK(call)), 1, 0)
+        return self._hook(_HOOK_BLOCK, self._pointer(BLOCK_CALLBACK(call)), *EVERYWHERE)
 
     def on_instruction(self, address: int, call: Callable[[], None]) -> None:
         """Call before the instruction at an address, in blocks that are translated from now on."""
@@ -301,11 +303,11 @@ class UnicornCore(Stateful):
 
     def on_interrupt(self, call: Callable[[int], None]) -> int:
         """Call (number) when the core raises an exception of Unicorn's own numbering; return the hook."""
-        return self._hook(_HOOK_INTERRUPT, self._pointer(INTERRUPT_CALLBACK(self._for_c(call, None))), 1, 0)
+        return self._hook(_HOOK_INTERRUPT, self._pointer(INTERRUPT_CALLBACK(self._for_c(call, None))), *EVERYWHERE)
 
     def on_invalid(self, call: Callable[[], bool]) -> int:
         """Call at an instruction that Unicorn does not know; True goes on after it; return the hook."""
-        return self._hook(_HOOK_INVALID, self._pointer(INVALID_CALLBACK(self._for_c(call, True))), 1, 0)
+        return self._hook(_HOOK_INVALID, self._pointer(INVALID_CALLBACK(self._for_c(call, True))), *EVERYWHERE)
 
     def on_bad_access(self, call: Callable[[int, int, int, int], bool], first: int = 1, last: int = 0) -> int:
         """Call (kind, address, size, value) at an access to no memory or against its protection; return the hook.
@@ -409,12 +411,12 @@ class UnicornCore(Stateful):
             return found is not None
 
         self._find_pages_by_hooks()
-        self._hook(_HOOK_TLB_FILL, self._pointer(PAGE_CALLBACK(self._for_c(fill, False))), 1, 0)
+        self._hook(_HOOK_TLB_FILL, self._pointer(PAGE_CALLBACK(self._for_c(fill, False))), *EVERYWHERE)
 
     def fill_tlb_native(self, callback: ctypes.c_void_p, user: int) -> None:
         """Have a C function say what may be done with each page, in place of the core's own memory map."""
         self._find_pages_by_hooks()
-        self._hook(_HOOK_TLB_FILL, callback, 1, 0, user)
+        self._hook(_HOOK_TLB_FILL, callback, *EVERYWHERE, user)
 
     def _find_pages_by_hooks(self) -> None:
         self._control(_CONTROL_TLB, ctypes.c_int(_TLB_OF_HOOKS))

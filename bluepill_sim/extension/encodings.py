@@ -175,8 +175,8 @@ class Encoding:
     def written(self, word: int) -> str:
         """Return an instruction as its syntax has it, with its registers and its condition."""
         values = self.values(word)
-        conditional = self.syntax.replace("<c>", _CONDITIONS[values.get("c", 0)])
-        return re.sub(r"<(\w)>", lambda found: f"R{values[found[1]]}", conditional)
+        words = {letter: _CONDITIONS[value] if letter == "c" else f"R{value}" for letter, value in values.items()}
+        return re.sub(r"<(\w)>", lambda found: words[found[1]], self.syntax)
 
 
 _NARROW_BITS, _WIDE_BITS = 16, 32

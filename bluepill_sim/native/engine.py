@@ -435,7 +435,7 @@ class NativeEngine(Engine):
         return NativeLastRows(self.shared)
 
     def _make_traps(self) -> Traps:
-        return NativeTraps(self._core, self.stop_before, self._leave_it_block, self._state)
+        return NativeTraps(self._core, self.stop_before, self._leave_it_block, lambda: self.block, self._state)
 
     def _measure_block(self, address: int, size: int) -> None:
         """Give C the row of a block that it does not know."""
@@ -533,7 +533,8 @@ class NativeEngine(Engine):
 
     def _trapped(self, kind: int, pc: int, value: int) -> None:
         halt = HALT_KINDS[kind]
-        self.stop_before(halt, pc, value if halt is HaltKind.UNALIGNED else None)
+        if self._traps.may_trap(halt, pc, value):
+            self.stop_before(halt, pc, value if halt is HaltKind.UNALIGNED else None)
 
     def _take_records(self, rows: int, count: int) -> None:
         if self.recorder is not None:
@@ -567,14 +568,19 @@ class NativeTraps(Traps):
     """`Traps` whose hooks look at the register in C; Python is called only when one traps."""
 
     def __init__(
-        self, core: UnicornCore, stop_before: StopBefore, leave_it_block: Callable[[], object], state: ctypes.c_void_p
-    ) -> None:
-        super().__init__(core, stop_before, leave_it_block)
+        self, core: UnicornCore, stop_before: StopBefore, leave_it_block: Callable[[], object],
+        running: Callable[[], BasicBlock], state: ctypes.c_void_p,
+    ) -> None:  # fmt: skip
+        super().__init__(core, stop_before, leave_it_block, running)
         self._state = state
 
     def needs_hooks(self, block: BasicBlock) -> bool:
         """As of `Traps`; a core of our own looks itself."""
         return not self._core.TELLS_PC and super().needs_hooks(block)
+
+    def may_trap(self, kind: HaltKind, address: int, value: int) -> bool:
+        """As of `Traps`."""
+        return self._core.TELLS_PC or super().may_trap(kind, address, value)
 
     def _trap(self, address: int, number: int, kind: HaltKind) -> None:
         if (address, number, kind) in self._trapped:

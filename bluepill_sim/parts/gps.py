@@ -167,7 +167,7 @@ def _days_before(year: int, month: int) -> int:
 
 def _date_of(days: int) -> tuple[int, int, int]:
     """Return year, month and day of a number of days since the beginning of the year 0."""
-    year = days * 400 // 146_097
-    year += _days_before(year + 1, 1) <= days
+    year = days * 400 // 146_097  # of the average length: one too few, or one too many
+    year += (_days_before(year + 1, 1) <= days) - (_days_before(year, 1) > days)
     month = next(number for number in range(12, 0, -1) if _days_before(year, number) <= days)
     return year, month, days - _days_before(year, month) + 1

@@ -181,9 +181,9 @@ class Ssd1306(Stateful):
         self._pending.append(byte)
         command = self._pending[0]
         if len(self._pending) > ARGUMENTS.get(command, 0):
-            arguments = bytes(self._pending[1:])
+            arguments = self._pending[1:]
             self._pending.clear()
-            self._do(command, arguments)
+            self._do(command, *arguments)
 
     def _put(self, byte: int) -> None:
         segment = COLUMNS - 1 - self._column if self._is_mirrored else self._column
@@ -198,54 +198,54 @@ class Ssd1306(Stateful):
             if wraps and self._mode == _HORIZONTAL:
                 self._page, _ = _next(self._page, *self._pages)
 
-    def _do(self, command: int, arguments: bytes) -> None:
+    def _do(self, command: int, *arguments: int) -> None:
         for first, last, act in self._COMMANDS:
             if first <= command <= last:
-                act(self, command, arguments)
+                act(self, command, *arguments)
                 return
         self.ignored += command not in _SILENT
 
-    def _half_column(self, command: int, _arguments: bytes) -> None:
+    def _half_column(self, command: int) -> None:
         low = command < 0x10
         column = self._column & 0xF0 | command & 0x0F if low else self._column & 0x0F | (command & 0x0F) << 4
         self._column = column % COLUMNS
 
-    def _set_mode(self, _command: int, arguments: bytes) -> None:
-        self._mode = min(arguments[0] & 3, _BY_PAGE)
+    def _set_mode(self, _command: int, mode: int) -> None:
+        self._mode = min(mode & 3, _BY_PAGE)
 
-    def _set_columns(self, _command: int, arguments: bytes) -> None:
-        self._columns = arguments[0] % COLUMNS, arguments[1] % COLUMNS
+    def _set_columns(self, _command: int, first: int, last: int) -> None:
+        self._columns = first % COLUMNS, last % COLUMNS
         self._column = self._columns[0]
 
-    def _set_pages(self, _command: int, arguments: bytes) -> None:
-        self._pages = arguments[0] % PAGES, arguments[1] % PAGES
+    def _set_pages(self, _command: int, first: int, last: int) -> None:
+        self._pages = first % PAGES, last % PAGES
         self._page = self._pages[0]
 
-    def _set_page(self, command: int, _arguments: bytes) -> None:
+    def _set_page(self, command: int) -> None:
         self._page = command & 7
 
-    def _set_start(self, command: int, _arguments: bytes) -> None:
+    def _set_start(self, command: int) -> None:
         self._start_line = command & 0x3F
 
-    def _set_offset(self, _command: int, arguments: bytes) -> None:
-        self._offset = arguments[0] & 0x3F
+    def _set_offset(self, _command: int, rows: int) -> None:
+        self._offset = rows & 0x3F
 
-    def _set_rows(self, _command: int, arguments: bytes) -> None:
-        self._rows = max(arguments[0] & 0x3F, _LEAST_ROWS - 1) + 1
+    def _set_rows(self, _command: int, last: int) -> None:
+        self._rows = max(last & 0x3F, _LEAST_ROWS - 1) + 1
 
-    def _set_segments(self, command: int, _arguments: bytes) -> None:
+    def _set_segments(self, command: int) -> None:
         self._is_mirrored = bool(command & 1)
 
-    def _set_commons(self, command: int, _arguments: bytes) -> None:
+    def _set_commons(self, command: int) -> None:
         self._is_upward = bool(command & 8)
 
-    def _set_all_on(self, command: int, _arguments: bytes) -> None:
+    def _set_all_on(self, command: int) -> None:
         self._is_all_on = bool(command & 1)
 
-    def _set_inverse(self, command: int, _arguments: bytes) -> None:
+    def _set_inverse(self, command: int) -> None:
         self._is_inverse = bool(command & 1)
 
-    def _set_on(self, command: int, _arguments: bytes) -> None:
+    def _set_on(self, command: int) -> None:
         self.is_on = bool(command & 1)
 
     #: First and last command, and what it does.

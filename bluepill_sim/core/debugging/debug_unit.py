@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from bluepill_sim.core.halts import HaltKind
-from bluepill_sim.core.unicorn_core import READ_ACCESS, Reg, UnicornCore
+from bluepill_sim.core.unicorn_core import EVERYWHERE, READ_ACCESS, Reg, UnicornCore
 
 
 class WatchKind(Enum):
@@ -140,7 +140,7 @@ class DebugUnit:
     def begin_step(self, pc: int) -> int:
         """Hook every instruction; return the hook for `end_step`."""
         self._step_from = pc
-        hook = self._core.hook_instructions(self._on_step, 1, 0)
+        hook = self._core.hook_instructions(self._on_step, *EVERYWHERE)
         self._core.drop_all_code()
         return hook
 

@@ -76,7 +76,7 @@ def compare_boundaries(boards: Boards, end_ns: Nanos, acts: Acts = ()) -> Compar
                 act(board)
         states = _Saved(boards)
         limit_ns = min(now_ns + SLICE_NS, end_ns, *(at for at, _ in waiting[:1]))
-        is_over = not _advance(boards, limit_ns)
+        is_over = not _advance(boards, limit_ns) and not waiting
         if values_apart(boards):
             difference = _narrowed(boards, states, limit_ns)
     return ComparedCores(end_ns=boards[0].now_ns, cycles=boards[0].cycle, difference=difference)
@@ -89,7 +89,7 @@ def values_apart(boards: Boards) -> tuple[CoreValue, ...]:
     rows += [("PC", boards[0].pc, boards[1].pc), ("cycle", boards[0].cycle, boards[1].cycle)]
     found = [core_value(name, one, other) for name, one, other in rows if one != other]
     seen = [_flat(board) for board in boards]
-    for name in [*seen[0], *(seen[1].keys() - seen[0].keys())]:
+    for name in seen[0] | seen[1]:
         values = [each.get(name) for each in seen]
         if values[0] != values[1]:
             found.append(core_value(name, *values))
@@ -123,7 +123,7 @@ def _advance(boards: Boards, limit_ns: Nanos) -> bool:
         reached = board.advance_to(limit_ns)
         while board.now_ns < limit_ns and reached.reason is not Reason.HALT:
             reached = board.advance_to(limit_ns)
-        goes_on |= board.now_ns >= limit_ns
+        goes_on |= reached.reason is not Reason.HALT
     return goes_on
 
 

@@ -1,5 +1,7 @@
 """The record of blocks and exceptions: what is in it, its bounds, and that it changes nothing."""
 
+import random
+
 import pytest
 
 from bluepill_sim.core import BLOCK, EXCEPTION_RETURN, BlockRecorder
@@ -107,6 +109,31 @@ def test_rows_that_come_as_bytes_and_one_by_one_are_in_their_order() -> None:
         recorder.put_packed(packed(5, 6))
         assert (len(recorder), recorder.drain_packed()) == (5, packed(2, 3, 4, 5, 6))
     assert (len(recorder), recorder.lost, recorder.drain()) == (0, 2, [])
+
+
+@pytest.mark.parametrize("capacity", [1, 2, 5])
+@pytest.mark.parametrize("drains", [False, True])
+def test_a_recorder_keeps_the_last_rows_and_counts_the_others(capacity: int, drains: bool) -> None:
+    draw, kept, lost = random.Random(f"{capacity} {drains}"), list[int](), 0
+    recorder = BlockRecorder(capacity, BlockRecorder.drain if drains else None)
+    for cycle in range(0, 400, 8):
+        count = draw.choice((1, 1, 2, 7))
+        rows = range(cycle, cycle + count)
+        if draw.random() < 0.5:
+            recorder.put_packed(packed(*rows))
+        else:
+            for row in rows:
+                recorder.put(row, 0, BLOCK)
+        for row in rows if not drains else ():
+            kept.append(row)
+            lost += len(kept) > capacity
+            del kept[:-capacity]
+        if not drains:
+            assert ([row[0] for row in recorder.last(9)], recorder.lost) == (kept, lost)
+        if draw.random() < 0.2:
+            recorder.drain()
+            kept.clear()
+    assert recorder.lost == lost
 
 
 def test_a_full_recorder_asks_to_be_drained(boot) -> None:

@@ -11,7 +11,9 @@ from pathlib import Path
 import pytest
 
 from bluepill_sim.board import BluePill
+from bluepill_sim.extension.library import core_chosen
 from bluepill_sim.program.image import Image, SymbolTable
+from tests.bluepill_sim.machine import Machine
 
 HERE = Path(__file__).parent
 RCC_APB2ENR, GPIOA_CRL, GPIOA_BSRR = 0x4002_1018, 0x4001_0800, 0x4001_0810
@@ -68,6 +70,7 @@ TRAPS = {
         "test_memory:test_code_across_a_page_boundary_is_charged_once",
     ],
     "buffers and hooks must outlive the library's handle": ["test_a_machine_outlives_the_boards_around_it"],
+    "hooks that trap stay where code is replaced": ["test_code_that_is_replaced_leaves_no_trap_behind"],
     "two aliases of the flash are two translations": [
         "test_memory:test_flash_is_seen_at_zero_too",
         "test_code_changed_by_one_alias_changes_at_the_other",
@@ -198,6 +201,28 @@ def test_a_warning_names_the_accessing_instruction(run) -> None:
     machine = run(f"mov32 r1, #{GPIOA_CRL}\nnop\nhere: str r1, [r1, #0]\nnop")
     (warning,) = machine.board.warnings
     assert f"here+0x0 (0x{machine.label('here'):08x})" in warning
+
+
+#: ldmia r1!, {r2, r3}; udiv r4, r4, r1; nop twice; ldmia r5!, {r2, r3} and a nop.
+_LOADS, _DIVIDES, _NOTHING, _LOADS_BY_R5 = 0xBF00_C90C, 0xF4F1_FBB4, 0xBF00_BF00, 0xBF00_CD0C
+
+
+@pytest.mark.parametrize("core", ["native", "python", "own"])
+@pytest.mark.parametrize(("first", "then", "r1"), [
+    (_LOADS, _NOTHING, 1), (_LOADS, _LOADS_BY_R5, 1), (_DIVIDES, _NOTHING, 0), (_DIVIDES, _LOADS_BY_R5, 0),
+])  # fmt: skip
+def test_code_that_is_replaced_leaves_no_trap_behind(core: str, first: int, then: int, r1: int) -> None:
+    with core_chosen(core):
+        machine = Machine(
+            f"{store(0xE000_ED14, 0x10)}mov32 r6, #0x20000900\nmov32 r1, #0x4770\nstr r1, [r6, #4]\n"
+            f"mov32 r4, #{first}\n"
+            f"str r4, [r6, #0]\nmov32 r1, #0x20000800\nmov32 r5, #0x20000901\nblx r5\nmov32 r4, #{then}\n"
+            f"str r4, [r6, #0]\ndsb\nisb\nmov32 r4, #0x20000901\nmov32 r5, #0x20000800\nmovs r1, #{r1}\nblx r4\nlog #1",
+            {},
+        )
+    machine.run(100)
+    assert machine.board.fault is None
+    assert machine.log == [1]
 
 
 def test_a_machine_outlives_the_boards_around_it(boot) -> None:

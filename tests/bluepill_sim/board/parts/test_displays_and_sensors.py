@@ -4,6 +4,7 @@ import math
 import struct
 import zlib
 from collections.abc import Callable, Iterable
+from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import pytest
@@ -315,6 +316,17 @@ def degrees(text: str, half: str) -> float:
 )
 def test_a_fix_has_the_date_of_its_time(start: str, at_s: int, date: str) -> None:
     assert checked(Gps(start=start).sentences(BoardMotion(), at_s * 10**9)[1])[9] == date
+
+
+@pytest.mark.parametrize("year", [2000, 2036, 2069])
+def test_every_day_of_a_year_has_its_date(year: int) -> None:
+    gps = Gps(start=f"{year:04d}-01-01T23:59:58")
+    for day in range(366):
+        at = datetime(year, 1, 1, 23, 59, 58, tzinfo=UTC) + timedelta(days=day)
+        for at_s, expected in ((day * 86_400 + 1, at), (day * 86_400 + 2, at + timedelta(seconds=2))):
+            assert (
+                checked(gps.sentences(BoardMotion(), at_s * 10**9)[1])[9] == f"{expected:%d%m}{expected.year % 100:02d}"
+            )
 
 
 @pytest.mark.parametrize("start", ["2026-02-29T00:00:00", "2026-13-01T00:00:00", "2026-01-01T24:00:00", "noon"])

@@ -114,11 +114,19 @@ def _episodes(core: str, _: random.Random) -> Iterator[str]:
     with core_chosen(core):
         board = BluePill(_image()[0])
     heard: list[str] = []
-    board.chip.processor.on_unmodelled = heard.append
+    warn = board.chip.processor.on_unmodelled
+
+    def hear(what: str) -> None:
+        heard.append(what)
+        warn(what)
+
+    board.chip.processor.on_unmodelled = hear
     fresh = board.snapshot()
     for number, (base, _stop) in enumerate(_image()[1]):
         board.restore(fresh)
-        yield "\n".join([f"program {number}", *_lines(board, number, base), f"{heard} {board.fault!r}"])
+        yield "\n".join(
+            [f"program {number}", *_lines(board, number, base), f"{heard} {board.warnings} {board.fault!r}"]
+        )
         heard.clear()
 
 

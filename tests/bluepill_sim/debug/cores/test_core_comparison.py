@@ -191,3 +191,19 @@ def test_an_input_is_put_on_both(boot: Boot) -> None:
     compared = compare_boundaries(boards, 4 * MS, [(2 * MS, lambda board: board.pin("PA0").drive(1))])
     assert compared.difference is None
     assert [board.pin("PA0").level for board in boards] == [1, 1]
+
+
+def test_a_lockup_ends_the_comparison_where_nothing_more_is_done_to_it() -> None:
+    locked = "cpsid f\nudf"
+    assert compare_boundaries(_locked(locked), 3 * MS).end_ns == MS
+    late = [(2 * MS, lambda board: board.pin("PA0").drive(1))]
+    assert compare_boundaries(_locked(locked), 4 * MS, late).end_ns == 3 * MS
+    assert compare_boundaries(_locked("cpsid f\nstay: b stay"), 3 * MS).end_ns == 3 * MS
+
+
+def _locked(source: str) -> tuple[BluePill, BluePill]:
+    boards = []
+    for core in ("own", "native"):
+        with core_chosen(core):
+            boards.append(Machine(source, {}).board)
+    return boards[0], boards[1]

@@ -292,6 +292,8 @@ def ways(draw: random.Random) -> Iterator[str]:
     seen = Seen()
     for payload in (
         *("p", "P=00000000", "P5", "m,4", "m20000000,", "vFlashErase:8000000,400", "m8000000,8", "s"),
+        *("m100000000,4", "mffffffff,1", "mffffffff,2", "Z0,100000000,2", "Z2,fffffffe,4", "s100000001", "c1ffffffff"),
+        *("vFlashWrite:50000000:", "vFlashDone", "vFlashWrite:50000000:x", "vFlashDone"),
         *(b"vFlashWrite:8000000:" + bytes(8), "vFlashErase:801fc00,400", "vFlashErase:7fffc00,400", "vFlashDone", "c"),
     ):
         yield f"{payload!r}: {seen.ask(payload)} {seen.where()}"

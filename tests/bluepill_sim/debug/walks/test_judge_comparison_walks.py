@@ -7,14 +7,17 @@ import ctypes
 import random
 from collections.abc import Callable, Iterable, Iterator
 from functools import cache
+from unittest.mock import patch
 
 from bluepill_sim import BluePill
+from bluepill_sim.cli.comparisons import compare_cores
 from bluepill_sim.core import Reg
 from bluepill_sim.core.unicorn_core import GENERAL
 from bluepill_sim.debug.cores.comparison import Acts, CoreValue, compare_boundaries, values_apart
 from bluepill_sim.debug.cores.judge import UnicornJudge, compare_instructions
 from bluepill_sim.extension.library import core_chosen
 from bluepill_sim.program.image import Image
+from bluepill_sim.program.line_table import LineRow, LineTable
 from tests.bluepill_sim.core.walks.programs import assembled
 from tests.bluepill_sim.debug.cores.test_core_comparison import PROGRAM, VECTORS
 from tests.bluepill_sim.machine import FLASH, STACK, Machine
@@ -30,6 +33,8 @@ _OTHERS = (
     ("subs r5, #16", "subs r5, #8"),
     ("stmia r5!, {r2, r3}", "stmia r5!, {r2, r4}"), ("svc #0", "nop"), ("adds r0, #2", "adds r0, #1"),
 )  # fmt: skip
+#: What the line of every second instruction is taken to be.
+_LINES = LineTable(tuple(LineRow(at, at + 2, "main.c", at % 1000) for at in range(FLASH, FLASH + 0x800, 4)))
 
 
 @cache
@@ -115,16 +120,23 @@ def _boundaries(_: random.Random) -> Iterator[str]:
         found = compared.difference
         where = said([found.at_ns, found.cycle, found.address, found.is_instruction]) if found else "the same"
         yield f"{after}: {compared.end_ns} {compared.cycles} {where} {_values(found.values if found else ())}"
+        if found:
+            with patch.object(compare_cores, "read_lines", lambda _image: _LINES):
+                yield "\n".join(compare_cores.lines_of(boards[0], "own", found))
     high: Acts = [(9_000, lambda board: board.pin("PA0").drive(1)), (9_001, lambda board: board.pin("PA1").drive(1))]
     for end_ns in (1, 40_000, MS + 1):
         boards = _board("own"), _board("python")
         yield f"{said(compare_boundaries(boards, end_ns, high))} {[board.pin('PA0').level for board in boards]}"
-    for source in ("udf\ntick: nop\ncall: nop", "bkpt #1\ntick: nop\ncall: nop"):
-        yield said(compare_boundaries((_board("own", source), _board("python", source)), MS))
+    for first in ("udf", "bkpt #1", "cpsid f\nudf"):
+        source = f"{first}\ntick: nop\ncall: nop"
+        yield said(compare_boundaries((_board("own", source), _board("python", source)), 3 * MS))
     boards = _board("own"), _board("python")
     for end_ns in (1_000, 9_000):
         boards[end_ns // 9_000].advance_to(end_ns)
         yield _values(values_apart(boards))
+    for board, words in zip(boards, ("odd", "even"), strict=True):
+        board.chip.warn(words, once=words)
+    yield said([[one.name, one.one, one.other] for one in values_apart(boards)[-4:]])
     dice, boards = random.Random("boundaries"), (_board("own"), _board("python"))
     for _number in range(20):
         yield f"{_disturb(boards[dice.randrange(2)], dice)} {_values(values_apart(boards))}"

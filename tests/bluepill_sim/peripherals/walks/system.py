@@ -291,11 +291,20 @@ def _pwr_move(w: RegisterWalker) -> None:
         w.pick((part.note_standby, part.forget_flags))()
 
 
+def _pwr_low(w: RegisterWalker) -> None:
+    """The detector of a low supply sees one, and is reset then, or not."""
+    w.write("PWR.CR", w.pick((0xF0, 0xF0, 0xE0)))
+    w.board.supply_v = w.pick((2.5, 2.2))
+    w.note(f"{w.board.supply_v} V")
+    if w.number(3):
+        w.reset()
+
+
 def _backup_domain(name: str, *parts: str) -> RegisterWalk:
     moves = {
         "RTC": (_rtc_move, _rtc_move, _rtc_read, _rtc_move, _rtc_alarm, _rtc_cut),
         "BKP": (_bkp_move,),
-        "PWR": (_pwr_move,),
+        "PWR": (_pwr_move, _pwr_move, _pwr_low),
     }[name]
     return RegisterWalk(
         name=name, parts=(name, *parts), begin=_backup_begin,

@@ -549,7 +549,8 @@ def versions(draw: random.Random) -> Iterator[str]:
         other = version(code_of(changed), code_of(others), struct.pack("<3I", *pool))
         yield said([(one.function, one.ours, one.theirs, one.before) for one in code_differences(other, image)])
     branches = [word for word in CODE if word in {0xD001, 0xE002, 0xB118, 0xB911} or word > 0xF000_0000]
-    for word in branches:  # each bit of what leads elsewhere
+    # B.W, whose second half looks like a CBZ.
+    for word in (*branches, 0xF000_B918, 0xF3FF_B1A5):  # each bit of what leads elsewhere
         image = version(code_of([0xBF00, word, 0xBF00]), code_of([0x4770]), struct.pack("<I", 7))
         for bit in range(32 if word > 0xFFFF else 16):
             other = version(code_of([0xBF00, word ^ 1 << bit, 0xBF00]), code_of([0x4770]), struct.pack("<I", 7))
