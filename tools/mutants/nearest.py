@@ -125,6 +125,12 @@ class Nearest:
         first = self._of_declared(path) if line not in _in_functions(self._root / path) else []
         return tuple(dict.fromkeys((*first, *self._of_python(path, line))))[:MOST_FILES]
 
+    def of_package_in_c(self, package: str) -> tuple[str, ...]:
+        """Return the files of tests that may run anything of a package's libraries in C or C++."""
+        folders = {folder for place, tests in TESTS_OF_C.items()
+                   if f"{place}/".startswith(f"{package}/") for folder in tests}  # fmt: skip
+        return tuple(name for name in self._tests if any(f"{name}/".startswith(f"{folder}/") for folder in folders))
+
     def made_of(self, test: str) -> tuple[str, ...]:
         """Return what a file of tests says by: itself, what of its own folder it imports, and the data beside it."""
         folder = test.rpartition("/")[0]
