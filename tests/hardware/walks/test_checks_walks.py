@@ -88,7 +88,7 @@ def _held(draw: random.Random) -> Iterator[str]:
     for change in changes:
         reading = replace(right, **change)
         yield said([[*change], gerbers.faults(design, vias, reading)])
-        for files, is_there in (({"a": "b"}, True), ({}, True), ({"a": "b"}, False)):
+        for files, is_there in (({"a": "b"}, True), ({}, True), ({"a": "b"}, False), ({}, False)):
             with (
                 patch.object(generated_files, "fabrication_archive", lambda _, files=files: files),
                 patch.object(generated_files, "checksum_faults", lambda _: ["a sum"] if draw.random() < 0.3 else []),
@@ -138,6 +138,35 @@ def asked(draw: random.Random) -> Iterator[str]:
             yield said(suite.simulations())
 
 
+def plain(draw: random.Random) -> Iterator[str]:
+    """Run the checks that need nothing else, with faults and without."""
+    yield said(suite.pin_rules())
+    with patch.object(suite, "findings", lambda *_: []):
+        yield said(suite.pin_rules())
+    yield said(suite.print_and_lands(build(VARIANT)))
+    for faults in ([], ["a fault", "another"]):
+        check = SimpleNamespace(is_good=not faults)
+        with (
+            patch.object(suite, "VARIANTS", (VARIANT,)),
+            patch.object(suite, "all_checks", lambda _, check=check: [check] * 3),
+            patch.object(suite, "print_and_lands", lambda _: []),
+            patch.object(suite, "gerbers_reread", lambda variant: f"gerbers of {variant}"),
+            patch.object(suite, "pin_rules", lambda: ["pins"]),
+            patch.object(generated_files, "sources", lambda: {"a": "b", "c": "d"}),
+            patch.object(suite, "bom_faults", lambda _, faults=faults: faults),
+            patch.object(suite, "netlist_faults", lambda _, faults=faults: faults),
+            patch.object(suite, "differences", lambda _, faults=faults: faults),
+            patch.object(copper, "faults", lambda *_, faults=faults: faults),
+            patch.object(generated_files, "stale_files", lambda _, faults=faults: faults),
+        ):
+            yield said(suite.plain())
+            with (
+                patch.object(kicad_checks, "with_kicad", lambda: ["K"]),
+                patch.object(suite, "simulations", lambda: [7]),
+            ):
+                yield said([str(one)[:30] for one in suite.run_all()])
+
+
 def _kept() -> str:
     return pours.stitches_text(pours.load_stitches(VARIANT))
 
@@ -183,5 +212,5 @@ def pieces(draw: random.Random) -> Iterator[str]:
                 yield said([by, z, fit.parts_keep_off_the_spacers()])
 
 
-TRACES: dict[str, Trace] = {each.__name__: each for each in (reread, asked, pieces)}
+TRACES: dict[str, Trace] = {each.__name__: each for each in (reread, asked, plain, pieces)}
 test_what_was_approved_is_shown = judge_of(__file__, TRACES)
