@@ -373,7 +373,7 @@ def outputs(draw: random.Random) -> Iterator[str]:
             shown.show_encoders((draw.choice((0, 1, 7, 8, -1)), draw.choice((0, 5))), now)
         else:
             (shown.show_safe if move == "safe" else shown.release)(now)
-        yield said([move, pins.writes])
+        yield said([move, pins.writes, shown.levels])
         pins.writes.clear()
     held = Distances(4, threshold_um=600, stale_ns=100)
     for now in range(0, 900, 30):
@@ -478,6 +478,20 @@ def pinouts(draw: random.Random) -> Iterator[str]:
         ("width = 3", "width = 2"),
         ('name = "encoder1"', 'name = "encoder3"'),
         ('shares = "', 'shares = "x'),
+        ('name = "rev-c"', 'name = "rev-b"'),
+        ('name = "p2os_rx"', 'name = "p2os_tx"'),
+        ('name = "DD2"', 'name = "DD1"'),
+        ('name = "motor2"\n', 'name = "motor1"\n'),
+        ("rev-c =", "# rev-c ="),
+        (", rev-c = ", "} # "),
+        ('direction = "to_bluepill"', 'direction = "to_adapter"'),
+        ('direction = "to_adapter"', 'direction = "to_bluepill"'),
+        ('bluepill = "PA', 'bluepill = "PD'),
+        ('bluepill = "PA1"', 'bluepill = "PA0"'),
+        ('pull = "down"', 'pull = "up"'),
+        ("safe = 0", "safe = 2"),
+        ("safe = 0", "safe = true"),
+        ('default_revision = "rev-', 'default_revision = "rev-x'),
     ):
         yield f"{old} {new}: {read_table(PINOUT_TEXT.replace(old, new))}"
     for wire in PINOUT.wires[::2]:

@@ -174,6 +174,11 @@ def streams(draw: random.Random) -> Iterator[str]:  # noqa: C901, PLR0912 - a ta
     for place in range(0, len(stream) + 1, 3):
         for limit in (None, len(stream) - 1, len(stream), place + 3, place + 4):
             yield said([payload.hex() for payload in sound_frames(stream, place, limit)])
+    for count in (0, 1, 2, 3, 4, 203, 204, 205, 255):
+        data = bytes([0xFA, 0xFB, count]) + bytes(300)
+        yield said(
+            [[len(payload) for payload in sound_frames(data, 0, limit)] for limit in (None, count + 3, count + 2)]
+        )
     for size in range(len(stream)):
         yield said([[payload.hex() for payload in sound_frames(stream[:size], place)] for place in (0, size - 2)])
     for hurt in range(len(stream)):
@@ -223,7 +228,7 @@ def packets(draw: random.Random) -> Iterator[str]:  # noqa: C901, PLR0912 - a ta
             yield tried(lambda one=one, profile=profile: StandardSip.from_frame(one.to_frame(profile), profile))
         yield said(properties_of(one))
         payload = one.to_frame(Profile.P2OS).payload
-        for size in {5, 20, 24, 25, len(payload) - 1, len(payload)}:
+        for size in {5, sip.COUNT_AT, sip.COUNT_AT + 1, 24, 25, len(payload) - 1, len(payload)}:
             yield said(
                 (
                     sip.is_sip(payload[:size]),
