@@ -205,7 +205,8 @@ def _compile(target: Target, source: Path) -> Path:
     if target.assembler and source.name in UNCOMBINED:
         flags = (*flags, "-mllvm", "--combiner-disabled")
     command = [compiler, *flags, "-S" if target.assembler else "-c", str(source)]
-    made_of = hashlib.sha256("\0".join([_version(compiler), _headers(), *command]).encode() + source.read_bytes())
+    words = [word.replace(f"{HERE}", "") for word in command]  # a copy of the checkout makes the same
+    made_of = hashlib.sha256("\0".join([_version(compiler), _headers(), *words]).encode() + source.read_bytes())
     result = OBJECTS / f"{source.stem}-{made_of.hexdigest()[:24]}.o"
     if not result.exists():
         OBJECTS.mkdir(parents=True, exist_ok=True)

@@ -94,8 +94,16 @@ TESTS_OF_C = {
     "robot_bench/wires": ("tests/robot_bench/wires",),
     "robot_bench/direct": ("tests/robot_bench/direct",),
     "adapter_fw/core/app": ("tests/adapter_fw/test_units.py", "tests/adapter_fw/test_shell.py"),
-    "adapter_fw/core": ("tests/adapter_fw/walks", "tests/adapter_fw/test_sameness.py", "tests/adapter_fw/test_units.py",
-                        "tests/adapter_sim/test_settings.py", "tests/adapter_fw/test_safety.py",
+    # What is generated is held to what it is generated from, and what is refused to its bounds.
+    **dict.fromkeys(
+        ("adapter_fw/core/adapter/setting_table.hpp", "adapter_fw/core/p2os/times.hpp",
+         "adapter_fw/core/p2os/commands.hpp"),
+        ("tests/adapter_sim/test_settings.py", "tests/adapter_fw/test_number_bounds.py")),
+    **dict.fromkeys(
+        ("adapter_fw/core/adapter/settings.cpp", "adapter_fw/core/adapter/settings.hpp"),
+        ("tests/adapter_fw/test_number_bounds.py", "tests/adapter_fw/test_units.py")),
+    "adapter_fw/core": ("tests/adapter_fw/walks", "tests/adapter_fw/test_units.py", "tests/adapter_fw/test_sameness.py",
+                        "tests/adapter_fw/test_number_bounds.py", "tests/adapter_fw/test_safety.py",
                         "tests/adapter_fw/test_program.py", "tests/adapter_fw/test_in_the_bench.py"),
 }  # fmt: skip
 

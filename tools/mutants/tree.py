@@ -16,6 +16,8 @@ from pathlib import Path
 #: The distribution that the checkout is installed as, and what of its metadata says where its code is.
 DISTRIBUTION, DIRECT_URL = "p2os", "direct_url.json"
 
+#: What is built beside sources: libraries, and objects that are named by what they were made of.
+BUILT = ("*/*.so", "*/build/objects/*.o")
 #: Where in its folder a copy is.
 TREE = "tree"
 #: Variables that the tests do not get; what is compiled is kept in the copy.
@@ -23,7 +25,7 @@ NOT_INHERITED = ("PYTEST", "XDG_", "MAKE", "PYTHONDONTWRITEBYTECODE")
 
 
 class Tree:
-    """A copy: all files that git knows or would add, and the libraries that were built beside them.
+    """A copy: all files that git knows or would add, and what was built beside them.
 
     Args:
         root: The checkout.
@@ -39,7 +41,7 @@ class Tree:
         hashed = hashlib.sha256()
         words = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
         listed = subprocess.run(words, cwd=root, capture_output=True, text=True, check=True).stdout.split("\0")
-        built = [path.relative_to(root).as_posix() for path in root.glob("*/*.so")]
+        built = [path.relative_to(root).as_posix() for pattern in BUILT for path in root.glob(pattern)]
         for name in (*filter(None, listed), *built):
             if (root / name).is_file():
                 copy = self.folder / name

@@ -1,6 +1,7 @@
 """The adapter's parts by themselves: numbers at every bound, times at every deadline, tables spoiled, as approved."""
 
 import random
+import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from types import SimpleNamespace
@@ -32,9 +33,9 @@ from p2os.protocol.commands import vel
 from p2os.protocol.frames import Frame
 from p2os.protocol.packets import Identity
 from p2os.protocol.profiles import Profile
-from p2os.protocol.sip import StandardSip
+from p2os.protocol.sip import SonarReading, StandardSip
 from p2os.robots.parameters import load_parameters
-from tests.adapter_sim.conftest import PARAMETERS, PINOUT, PINOUT_TEXT, FakePins, FakeRobot, four_bits
+from tests.adapter_sim.conftest import PARAMETERS, PINOUT, PINOUT_TEXT, FakePins, FakeRobot, Rig, four_bits
 from tests.tools.suite.approved import Trace, judge_of, said, tried
 from tests.tools.suite.declared import declared_of
 
@@ -372,7 +373,7 @@ def outputs(draw: random.Random) -> Iterator[str]:
             shown.show_encoders((draw.choice((0, 1, 7, 8, -1)), draw.choice((0, 5))), now)
         else:
             (shown.show_safe if move == "safe" else shown.release)(now)
-        yield said([move, pins.writes])
+        yield said([move, pins.writes, shown.levels])
         pins.writes.clear()
     held = Distances(4, threshold_um=600, stale_ns=100)
     for now in range(0, 900, 30):
@@ -477,6 +478,20 @@ def pinouts(draw: random.Random) -> Iterator[str]:
         ("width = 3", "width = 2"),
         ('name = "encoder1"', 'name = "encoder3"'),
         ('shares = "', 'shares = "x'),
+        ('name = "rev-c"', 'name = "rev-b"'),
+        ('name = "p2os_rx"', 'name = "p2os_tx"'),
+        ('name = "DD2"', 'name = "DD1"'),
+        ('name = "motor2"\n', 'name = "motor1"\n'),
+        ("rev-c =", "# rev-c ="),
+        (", rev-c = ", "} # "),
+        ('direction = "to_bluepill"', 'direction = "to_adapter"'),
+        ('direction = "to_adapter"', 'direction = "to_bluepill"'),
+        ('bluepill = "PA', 'bluepill = "PD'),
+        ('bluepill = "PA1"', 'bluepill = "PA0"'),
+        ('pull = "down"', 'pull = "up"'),
+        ("safe = 0", "safe = 2"),
+        ("safe = 0", "safe = true"),
+        ('default_revision = "rev-', 'default_revision = "rev-x'),
     ):
         yield f"{old} {new}: {read_table(PINOUT_TEXT.replace(old, new))}"
     for wire in PINOUT.wires[::2]:
@@ -604,6 +619,75 @@ def sessions(draw: random.Random) -> Iterator[str]:
             yield said([now, [frame.hex() for frame in sent], events, session.next_deadline(), session.stats])
 
 
+def _acts(draw: random.Random, rig: Rig, robot: FakeRobot) -> dict[str, Callable[[], object]]:
+    adapter, now = rig.adapter, rig.now
+    level = draw.random() < 0.5
+    x_mm, echo = draw.choice((0, 5, 40, 9_000)), SonarReading(draw.randint(0, 9), draw.choice((0, 599, 600, 3_000)))
+    moved = replace(
+        robot.sip, raw_x=(robot.sip.raw_x + x_mm) % 0x8000, stall_left=draw.random() < 0.1, sonar=(echo,) * level,
+        raw_heading=draw.choice((0, robot.sip.raw_heading, 700)),
+    )  # fmt: skip
+    report = PadReport(
+        up=draw.random() < 0.5, down=draw.random() < 0.15, forward=draw.choice((0, 41, 1_023)),
+        backward=draw.choice((0, 500)), turn=draw.choice((0, -512, 300)),
+    )  # fmt: skip
+    return {
+        "motors": lambda: rig.pins.motors(draw.randint(-4, 3), draw.randint(-4, 3), now),
+        "connect": lambda: rig.pins.set("p2dx_con", draw.random() < 0.8, now),
+        "reset": lambda: rig.pins.set("rst", level and draw.random() < 0.3, now),
+        "glitch": lambda: [
+            rig.pins.set("p2dx_con", high, at) for high, at in ((level, now), (not level, now + 3 * MS))
+        ],
+        "move": lambda: setattr(robot, "sip", moved),
+        "SIP": lambda: adapter.receive(moved.to_frame(Profile.P2OS).to_bytes(), now) if robot.connection.is_open else 0,
+        "noise": lambda: adapter.receive(draw.choice((b"", b"\xfa\xfb\3", bytes(9))), now),
+        "pad": lambda: adapter.receive_pad(report, now),
+        "master": lambda: adapter.set_master(draw.choice(tuple(Master)), now) if level else None,
+        "shutdown": lambda: adapter.shutdown("asked", now) if draw.random() < 0.2 else None,
+        "obeys": lambda: setattr(robot, "obeys", draw.random() < 0.7),
+        "sends": lambda: setattr(robot, "sends", draw.random() < 0.7),
+        "cut": lambda: setattr(rig.to_robot, "cut", draw.random() < 0.3),
+        "restore": lambda: adapter.restore(adapter.snapshot()),
+    }
+
+
+def adapters(draw: random.Random) -> Iterator[str]:
+    """Whole adapters between a robot and wires that do anything: what they show, send, say and keep."""
+    for number, options in enumerate((
+        {}, {"motor_command": MotorCommand.DUTY, "encoder_at_open": EncoderAtOpen.ZERO, "encoder_dwell_ns": 0},
+        {"bauds": (9_600, 38_400), "pad_loss_ns": 300 * MS, "stop_repeats": 1, "boot_ns": 0},
+        {"motor_meaning": MotorMeaning.LINEAR_ANGULAR, "max_velocity_mm_s": 150, "plausibility_ns": 500 * MS},
+    )):  # fmt: skip
+        robot = FakeRobot()
+        rig = Rig(
+            AdapterSettings(threshold_um=600_000, **options), robot,  # type: ignore[arg-type]  # of each setting its own
+            pinout=PINOUT if number < 3 else parse_pinout(four_bits()), now=number,
+            receiver=Receiver(9_600) if number == 2 else None,
+        )  # fmt: skip
+        adapter = rig.adapter
+        if number == 1:
+            adapter.wait_for_edges()
+        rig.ms(310)
+        rig.pins.set("p2dx_con", True, rig.now)
+        rig.ms(700)
+        for step in range(70):
+            acts = _acts(draw, rig, robot)
+            if step % 9 == 8:
+                rig.to_robot.cut, robot.obeys, robot.sends = False, True, True
+                rig.pins.set("rst", False, rig.now)
+                rig.pins.set("p2dx_con", step % 2 == 0, rig.now)
+            what = draw.choice((*acts, "motors", "motors", "move", "SIP", "pad"))
+            acts[what]()
+            yield said([what, adapter.status, adapter.next_deadline(), adapter.first_sight(rig.now)])
+            before = rig.now
+            rig.ms(draw.choice((0, 1, 2, 9, 60, 100, 240, 351)))
+            yield said([rig.now, adapter.status, adapter.master, adapter.baud, sorted(adapter.wakes_on), rig.events])
+            kept = zlib.crc32(said(adapter.snapshot()).encode())
+            yield said([rig.pins.writes, rig.sent(before), adapter.next_deadline(), kept])
+            rig.events.clear()
+            rig.pins.writes.clear()
+
+
 TRACES: dict[str, Trace] = {
     "codec": codec,
     "mixes": mixes,
@@ -618,6 +702,7 @@ TRACES: dict[str, Trace] = {
     "settings": settings,
     "stops": stops,
     "sessions": sessions,
+    "adapters": adapters,
     "declared": declared_of("adapter_sim"),
 }
 test_a_walk_shows_what_was_approved = judge_of(__file__, TRACES)

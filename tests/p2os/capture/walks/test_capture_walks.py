@@ -28,6 +28,8 @@ from p2os.capture.sips import sips_of
 from p2os.capture.table import table_of, tables_of, tables_of_sips, write_csv
 from p2os.protocol.command_table import BY_NUMBER
 from p2os.protocol.commands import Command
+from p2os.protocol.frames import Frame
+from p2os.protocol.packets import packet_frame
 from p2os.protocol.profiles import Profile
 from p2os.robots.parameters import load_parameters
 from p2os.view.capture_recording import CaptureTracks
@@ -36,6 +38,7 @@ from p2os.view.recording import ViewRecording
 from simbase.timing import NS_PER_MS
 from tests.p2os.capture.blocks import blocks_of
 from tests.p2os.capture.network_files import ETHERNET, network_file, segment
+from tests.p2os.protocol.drawn_packets import KINDS, Draw
 from tests.tools.suite.approved import Trace, judge_of, said, tried
 from tests.tools.suite.declared import declared_of
 
@@ -93,6 +96,18 @@ def vectors(draw: random.Random) -> Iterator[str]:
                 yield "\n".join([line_of(row, has_time=False), *lines_of(explain(row, reading))])
         yield said((guess_direction(data[3:-2]), guess_direction(draw.randbytes(4))))
     yield said([summary_of(rows, bad, s) for rows, bad, s in ((0, 0, 0.0), (1, 1, 0.5), (2, 0, 61.0), (1200, 3, 3.0))])
+
+
+def fields(draw: random.Random) -> Iterator[str]:
+    """Explain each kind of packet in each layout, with bytes behind its last field and without its last one."""
+    source = Draw(draw.getrandbits(20))
+    for number, make in enumerate(KINDS.values()):
+        for profile, reading in zip(Profile, READINGS, strict=True):
+            payload = packet_frame(make(source), profile).payload
+            for changed in (payload, payload + b"\1\2", payload[:-1] or payload):
+                data = Frame(changed[:200]).to_bytes()
+                for row in rows_of(capture_of([(NS_PER_MS * number, FROM, data)]), reading):
+                    yield "\n".join([line_of(row, has_time=False), *lines_of(explain(row, reading))])
 
 
 def sessions(draw: random.Random) -> Iterator[str]:
@@ -167,6 +182,8 @@ def replays(draw: random.Random) -> Iterator[str]:
             )
 
 
-TRACES: dict[str, Trace] = {each.__name__: each for each in (vectors, sessions, formats, tables, views, replays)}
+TRACES: dict[str, Trace] = {
+    each.__name__: each for each in (vectors, fields, sessions, formats, tables, views, replays)
+}
 TRACES["declared"] = declared_of("p2os.capture", "p2os.capture.columns", "p2os.capture.formats")
 test_what_was_approved_is_shown = judge_of(__file__, TRACES)

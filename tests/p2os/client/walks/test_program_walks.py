@@ -8,7 +8,8 @@ import socket
 import threading
 from collections.abc import Awaitable, Callable, Iterable, Iterator
 from contextlib import closing, suppress
-from dataclasses import fields
+from dataclasses import fields, replace
+from enum import Enum
 from inspect import isawaitable
 from logging import Handler, LogRecord, getLogger
 from typing import Any
@@ -18,8 +19,9 @@ from weakref import finalize
 from p2os import Robot
 from p2os.client import aio, link, notices, robot
 from p2os.client.aux_ports import AuxBuffer
+from p2os.client.calls import GripperAction, RobotCalls
 from p2os.client.core import RobotCore
-from p2os.client.line import Line
+from p2os.client.line import Line, Listeners
 from p2os.client.notices import words_of
 from p2os.client.observer import Bumpers, Observer, bumpers_of, limits_of
 from p2os.client.outbox import CloseLine, OpenLine, Outbox, Send, SetBaud
@@ -40,9 +42,12 @@ from p2os.transport.waiting import wait_readable
 from simbase.errors import P2osError
 from simbase.timing import NS_PER_MS, NS_PER_S
 from tests.p2os.client.client_rig import free_pioneer
+from tests.tools.suite.acted import Acted, taken
 from tests.tools.suite.approved import Trace, judge_of, refusal, said, tried
 
 MS = NS_PER_MS
+#: −127 and below: the robot has no thermometer.
+CELSIUS = (-128, -127, -126, 40)
 NAME = Identity(name="Rob", robot_class="Pioneer", subclass="p2dx")
 
 
@@ -245,7 +250,7 @@ def program(draw: random.Random, place: Place, acts: int, **options: Any) -> Ite
             ]
             yield said([tried(lambda name=name: getattr(it, name)) for name in ("state", "identity", "link", "limits")])
             with closing(it):
-                yield tried(lambda: it.connect() is it) + place.taken()
+                yield tried(lambda: it.connect() is it) + place.taken() + said(place.runner._thread.named)
                 for number in range(acts):
                     if number == acts * 2 // 3:
                         for end in ends:
@@ -424,10 +429,20 @@ def awaited(draw: random.Random) -> Iterator[str]:
         yield runner.run(refused()) + place.taken()
 
 
+def inside(part: object) -> str:
+    """Return what a part keeps for itself: numbers, texts and words."""
+    kept = {name: value for name, value in vars(part).items() if isinstance(value, int | float | str | Enum | None)}
+    return said(kept)
+
+
 def peers(draw: random.Random) -> Iterator[str]:  # noqa: C901, PLR0912 - a table of answers
     """Yield how a client looks for a robot among peers that answer in part, and how it raises a line's speed."""
-    sip = StandardSip(raw_battery=120)
+    sips = (
+        StandardSip(raw_battery=120), StandardSip(gripper_state=2), StandardSip(analog_port=3),
+        StandardSip(raw_battery=120, tail=(900, 80, 21)),
+    )  # fmt: skip
     for number in range(32):
+        sip, name = sips[number // 2 % 4], Identity("Rob", "Pioneer", ("p2dx", "p3dx-sh", "p2at8")[number % 3])
         way = ["silent", "noise", "echo", "named", "opened", "sips", "sips", "raised", "raised", "mute"][number % 10]
         baud = 9600 if way == "raised" else draw.choice((None, 9600, 38400))
         chosen = ClientSettings(
@@ -438,6 +453,7 @@ def peers(draw: random.Random) -> Iterator[str]:  # noqa: C901, PLR0912 - a tabl
             subclass="p2dx", autobaud=draw.choice((0, 2, 2)), transvelmax=900, fields_sent=len(FIELDS)
         )
         line_baud, is_named, is_open = baud, False, False
+        yield inside(core._supervisor) + inside(core) + inside(core._mover)
         core.connect(0)
         yield said((number, way, baud, chosen.raise_baud, chosen.reconnect, config.autobaud))
         for _ in range(60):
@@ -453,7 +469,7 @@ def peers(draw: random.Random) -> Iterator[str]:  # noqa: C901, PLR0912 - a tabl
                         line_baud = action.baud
                     case Send():
                         command = Command.from_frame(Frame.from_bytes(action.data))
-                        answer = answered("open" if is_open else way, command, config, gives=way == "raised")
+                        answer = answered("open" if is_open else way, command, config, name, gives=way == "raised")
                         # SYNC1 and SYNC2 have the numbers of OPEN and CLOSE.
                         if command.number == C.OPEN:
                             is_open = is_named and way in {"sips", "raised"}
@@ -470,6 +486,7 @@ def peers(draw: random.Random) -> Iterator[str]:  # noqa: C901, PLR0912 - a tabl
             yield said(
                 (now // MS, core.link, core.baud, core.is_ready, core.next_deadline(), core.is_quiet, news, core.stats)
             )
+            yield inside(core._supervisor) + said((core._supervisor.profile, core.profile, core.limits))
             if draw.random() < 0.03:
                 core.line_lost("it vanished", now)
             due = core.next_deadline()
@@ -480,7 +497,7 @@ def peers(draw: random.Random) -> Iterator[str]:  # noqa: C901, PLR0912 - a tabl
         yield said((core.link, core.take_action(now), core.is_ready))
 
 
-def answered(way: str, command: Command, config: ConfigPacket, *, gives: bool) -> list[bytes]:
+def answered(way: str, command: Command, config: ConfigPacket, name: Identity, *, gives: bool) -> list[bytes]:
     """Return what a peer sends back for a command."""
     kind = command.number
     if way == "silent":
@@ -493,7 +510,7 @@ def answered(way: str, command: Command, config: ConfigPacket, *, gives: bool) -
     if kind in {0, 1} and way != "open":
         found.append(Frame(bytes((kind,))).to_bytes())
     if kind == 2 and way not in {"mute", "open"}:
-        found.append(NAME.to_frame().to_bytes())
+        found.append(name.to_frame().to_bytes())
     if kind == C.CONFIG and gives:
         found.append(config.to_frame().to_bytes())
     return found
@@ -621,15 +638,98 @@ def observed(draw: random.Random) -> Iterator[str]:
                 analog_port=draw.choice((0, 1, 5, 9)), gripper_state=draw.choice((0, 0, 2, 6)),
                 raw_analog=draw.randrange(256),
                 digital_in=draw.randrange(256), digital_out=draw.randrange(256),
-                tail=draw.choice(((), (), (900, 80, 21), (0, 0, 129))),
+                tail=draw.choice(((), (), (900, 80, 21), *((120, 1, -5, 3, 9, celsius, 80) for celsius in CELSIUS))),
                 sonar=tuple(SonarReading(draw.randrange(40), draw.choice((0, 500,
                 9000))) for _ in range(draw.randrange(3))),
             )  # fmt: skip
             it.firmware.take(packet)
             yield tried(it.take, packet, now)
             yield said((it.firmware.profile, it.firmware.tells_motors, it.wheels_mps, it.doubtful_gap_ns(limits)))
+            yield inside(it.firmware) + inside(it._pose)
             assert it.state is not None
             yield said((it.state.nearest(), it.state.nearest(0.0, 1.0), it.state.is_stalled))
+
+
+def gaps(draw: random.Random) -> Iterator[str]:
+    """Yield which time between two packets is doubtful, right before it and at it, by either limit alone."""
+    for model in ("p2dx", "p3at-sh"):
+        parameters = load_parameters(model)
+        half_span_m = (1 << 14) * parameters.distance_conv_mm / 1000
+        for forward, turn, longest_s in ((0.5, 0.001, half_span_m / 0.5), (0.001, 2.0, math.pi / 2)):
+            for by in (-1000, 0, 1000):
+                it = Observer(parameters)
+                yield inside(it._pose) + inside(it)
+                limits = replace(limits_of(parameters, None), forward_mps=forward, turn_radps=turn)
+                for at in (7, 7 + math.ceil(longest_s * NS_PER_S) + by):
+                    it.take(StandardSip(), at)
+                    yield said((at, it.doubtful_gap_ns(limits)))
+
+
+class Carried:
+    """Carries calls out at once, on a core that notes what it is sent."""
+
+    def __init__(self, *_: object) -> None:
+        self.calls: list[str] = []
+        self.listeners = Listeners()
+
+    def run(self, call: Callable[[Any, int], Any]) -> Any:
+        return call(Acted(self.calls, "core"), 5)
+
+    def finish(self) -> None:
+        """Nothing."""
+
+
+class Asked(RobotCalls):
+    """A robot whose calls are noted."""
+
+    _runner_type = Carried
+
+
+def bounds(draw: random.Random) -> Iterator[str]:  # noqa: C901 - a table after the other
+    """Yield what each call sends at the ends of what it takes, and what it refuses beyond them."""
+    it = Asked("tcp:robot")
+    gripper, calls, octets = it.gripper, it._runner.calls, (-1, 0, 1, 0x7F, 0x80, 0xFF, 0x100)  # type: ignore[attr-defined]
+
+    def shown(action: Callable[..., object], *arguments: object, **named: object) -> str:
+        return tried(action, *arguments, **named) + taken(calls)
+
+    for mask in octets:
+        yield said([shown(it.set_digital, mask, states) for states in octets])
+    for length_s in (-0.01, 0.0, 0.009, 0.011, 0.02, 5.1, 5.11):
+        yield said([shown(it.say, [(length_s, tone)]) for tone in (-1, 0, 1, 255, 256)])
+    yield said([shown(it.say, [(0.1, 60)] * count) for count in (0, 1, 2, 20, 21)])
+    yield said([shown(it.set_sonar_order, order) for order in ((), (-1,), (0, 5), (253, 254), (255,), (3, 256))])
+    names = ("forward_mps", "turn_radps", "accel_mps2", "decel_mps2", "turn_accel_radps2", "turn_decel_radps2")
+    for name in names:
+        limits = (None, -1.0, 0.0, 1e-9, 0.25, 1.0, 30.0, math.inf, math.nan, "1", True)
+        yield said([shown(it.set_limits, **{name: limit}) for limit in limits])
+    yield shown(it.set_limits, **dict.fromkeys(names, 0.5))
+    for call in (it.set_sonar, it.set_buzzer, it.enable):
+        yield said([shown(call, on) for on in (True, False)])
+    yield said([shown(it.enable), shown(it.set_sonar), shown(it.disable), shown(it.stop), shown(it.emergency_stop)])
+    for each in (it.request_io, it.request_encoders, gripper.request):
+        yield said([shown(each), shown(each, always=True), shown(each, always=False)])
+    for act in (gripper.open, gripper.close, gripper.stop, gripper.lift_up, gripper.lift_down, gripper.store):
+        yield shown(act)
+    yield shown(gripper.deploy)
+    for number in octets:
+        for ask in (gripper.carry, gripper.set_pressure, it.play_sound, it.select_analog):
+            yield shown(ask, number)
+    yield said([shown(gripper.act, action) for action in GripperAction])
+    pose: tuple[Any, ...]
+    for pose in ((), (1.0,), (1.0, -2.0, 0.5), ("x",), (1.0, None), (1.0, 2.0, "y")):
+        yield shown(it.set_pose, *pose) + shown(it.set_velocity, *pose[:2])
+    for argument in (None, 7, b"ab"):
+        yield shown(it.send, 11, argument) + shown(it.send, Command(28, argument))
+    for deadman_s in (None, 0.5, 1.25):
+        options: tuple[dict[str, Any], ...] = (
+            {},
+            {"auto_enable": False},
+            {"reconnect": False},
+            {"settings": ClientSettings(auto_enable=False)},
+        )
+        yield said([Asked("tcp:r", deadman_s=deadman_s, **option)._core.settings for option in options])
+    yield said([Asked("serial:/dev/x", model=model)._core.parameters.subclass for model in (None, "p3at-sh")])
 
 
 def lines(draw: random.Random) -> Iterator[str]:
@@ -672,6 +772,7 @@ def lines(draw: random.Random) -> Iterator[str]:
 
 
 TRACES: dict[str, Trace] = {
-    each.__name__: each for each in (usual, careful, blind, bare, awaited, peers, parts, aux_bytes, observed, lines)
+    each.__name__: each
+    for each in (usual, careful, blind, bare, awaited, peers, parts, aux_bytes, observed, gaps, bounds, lines)
 }
 test_what_was_approved_is_shown = judge_of(__file__, TRACES)

@@ -4,7 +4,7 @@
 
 import random
 from collections.abc import Iterator
-from dataclasses import fields, replace
+from dataclasses import fields, is_dataclass, replace
 from enum import IntFlag
 from typing import get_args
 
@@ -18,10 +18,14 @@ from p2os.protocol.frames import GIVE_UP_NS, Decoder, Frame, checksum, sound_fra
 from p2os.protocol.packets import (
     PACKET_KINDS,
     RESET_KINDS,
+    BatteryPacket,
     GripperState,
+    GyroReading,
     Identity,
     PlainPacket,
+    ResetNotice,
     SerauxPacket,
+    SimLaserPacket,
     packet_frame,
     packet_name,
     read_packet,
@@ -126,7 +130,7 @@ def orders(draw: random.Random) -> Iterator[str]:
     yield said([(each, each.to_frame().to_bytes().hex()) for each in makers])
 
 
-def streams(draw: random.Random) -> Iterator[str]:  # noqa: C901 - a table of acts
+def streams(draw: random.Random) -> Iterator[str]:  # noqa: C901, PLR0912 - a table of acts
     """Let a decoder take frames that are cut, damaged, within each other and late."""
     yield said([checksum(bytes([255] * size)) for size in (0, 1, 2, 3, 64, 255, 256)])
     for size in (0, 1, 202, 203):
@@ -170,6 +174,13 @@ def streams(draw: random.Random) -> Iterator[str]:  # noqa: C901 - a table of ac
     for place in range(0, len(stream) + 1, 3):
         for limit in (None, len(stream) - 1, len(stream), place + 3, place + 4):
             yield said([payload.hex() for payload in sound_frames(stream, place, limit)])
+    for count in (0, 1, 2, 3, 4, 203, 204, 205, 255):
+        data = bytes([0xFA, 0xFB, count]) + bytes(300)
+        yield said(
+            [[len(payload) for payload in sound_frames(data, 0, limit)] for limit in (None, count + 3, count + 2)]
+        )
+    for size in range(len(stream)):
+        yield said([[payload.hex() for payload in sound_frames(stream[:size], place)] for place in (0, size - 2)])
     for hurt in range(len(stream)):
         yield said(
             [payload.hex() for payload in sound_frames(stream[:hurt] + bytes([stream[hurt] ^ 1]) + stream[hurt + 1 :])]
@@ -179,10 +190,21 @@ def streams(draw: random.Random) -> Iterator[str]:  # noqa: C901 - a table of ac
 def properties_of(packet: object) -> dict[str, object]:
     """Return what a packet says beside its fields; bits as numbers."""
     found = {name: getattr(packet, name) for name, value in vars(type(packet)).items() if isinstance(value, property)}
-    return {name: int(value) if isinstance(value, IntFlag) else value for name, value in found.items()}
+    found = {name: int(value) if isinstance(value, IntFlag) else value for name, value in found.items()}
+    if isinstance(packet, BatteryPacket):
+        found["charges"] = [packet.relative_charge(number) for number in range(len(packet.batteries))]
+    if isinstance(packet, GyroReading):
+        found["rates"] = [packet.rate_deg_s(), packet.rate_deg_s(500.5, 2.0)]
+    if isinstance(packet, StandardSip):
+        found["tail"] = [packet.tail_field(name) for name, *_ in sip.TAIL]
+    for part in fields(packet) if is_dataclass(packet) else ():
+        value = getattr(packet, part.name)
+        rows = [properties_of(each) for each in (value if isinstance(value, tuple) else (value,)) if is_dataclass(each)]
+        found |= {part.name: rows} if any(rows) else {}
+    return found
 
 
-def packets(draw: random.Random) -> Iterator[str]:  # noqa: C901 - a table of rows
+def packets(draw: random.Random) -> Iterator[str]:  # noqa: C901, PLR0912 - a table of rows
     """Read a packet of each kind, whole and cut anywhere."""
     for kind in PACKET_KINDS:
         yield said((kind.kind, kind.name, kind.table, packet_name(kind.kind)))
@@ -203,9 +225,10 @@ def packets(draw: random.Random) -> Iterator[str]:  # noqa: C901 - a table of ro
         one = any_sip(source)
         for profile in Profile:
             yield tried(lambda one=one, profile=profile: one.to_frame(profile).to_bytes().hex())
+            yield tried(lambda one=one, profile=profile: StandardSip.from_frame(one.to_frame(profile), profile))
         yield said(properties_of(one))
         payload = one.to_frame(Profile.P2OS).payload
-        for size in {5, 20, 24, 25, len(payload) - 1, len(payload)}:
+        for size in {5, sip.COUNT_AT, sip.COUNT_AT + 1, 24, 25, len(payload) - 1, len(payload)}:
             yield said(
                 (
                     sip.is_sip(payload[:size]),
@@ -213,6 +236,7 @@ def packets(draw: random.Random) -> Iterator[str]:  # noqa: C901 - a table of ro
                     sip.unpack_tail(payload[:size], min(size, 25)),
                 )
             )
+            yield tried(StandardSip.from_frame, Frame(payload[:size]), Profile.ARCOS)
     several = [any_sip(source).to_frame(Profile.P2OS).payload for _ in range(5)]
     yield said([sip.unpack_heads(several), sip.unpack_heads(several[:1]), sip.unpack_heads([])])
     yield said(
@@ -228,6 +252,14 @@ def packets(draw: random.Random) -> Iterator[str]:  # noqa: C901 - a table of ro
                    {"sonar": tuple(SonarReading(n, n) for n in range(60))}, {"tail": (65536,)}, {"tail": (1, -129)}, {"tail": (1, -128)},
                    {"tail": (1,) * 9}, {"tail": (1,) * 10}, {"rest": b"ab"}):  # fmt: skip
         yield tried(lambda change=change: replace(StandardSip(), **change).to_frame(Profile.AROS).to_bytes().hex())
+    rows = (((1, 2), (3, 4), (5, 6)), ((1,), (3, 4), (5, 6)), ((1, 2), (3,), (5, 6)), ((1, 2), (3, 4), (5,)))
+    for ranges, reflectances, flags in rows:
+        laser = SimLaserPacket(is_extended=True, ranges_mm=ranges, reflectances=reflectances, flags_of_readings=flags)
+        yield tried(lambda laser=laser: laser.to_frame().to_bytes().hex())
+    for size in (3, 4, 5):
+        yield said(properties_of(BatteryPacket(batteries=(tuple(range(size)),), row_bytes=size)))
+    for kind in (0xFD, 0xFE, 0xFF):
+        yield said([tried(ResetNotice(kind=kind).to_frame), tried(ResetNotice.from_frame, Frame(bytes((kind, 7))))])
     yield said([StandardSip(), sip.TAIL, sip.TAIL_MEANINGS, sip.SIP_KINDS, sip.BEFORE_SONAR, sip.BEHIND_SONAR])
 
 
@@ -313,7 +345,8 @@ def counters(draw: random.Random) -> Iterator[str]:
 def happened(end: Connection) -> Iterator[str]:
     while (event := end.next_event()) is not None:
         yield said((type(event).__name__, event))
-    yield said((end.state, end.is_open, end.next_deadline(), [data.hex() for data in end.take_output()], end.stats))
+    sent = [data.hex() for data in end.take_output()]
+    yield said((end.state, end.is_open, end.next_deadline(), sent, end.stats, [*end._side.snapshot().values()]))
 
 
 def answers(draw: random.Random) -> Frame:
@@ -349,6 +382,7 @@ def clients(draw: random.Random) -> Iterator[str]:  # noqa: C901, PLR0912 - a ta
             profile=draw.choice([*Profile]), open_retry_ns=draw.choice((40, 300)) * NS_PER_MS,
         )  # fmt: skip
         end, now = Connection(ConnectionRole.CLIENT, settings=chosen), 1000
+        yield said(end.snapshot())
         yield tried(end.connect, now)
         for _ in range(draw.choice((9, 24))):
             wanted = {"SYNC0": Frame(b"\0"), "SYNC1": Frame(b"\1"), "SYNC2": Frame(b"\2A\0Pioneer\0p2dx\0")}.get(
@@ -406,6 +440,56 @@ def opened(draw: random.Random) -> Iterator[str]:
             yield from happened(end)
 
 
+def layouts(draw: random.Random) -> Iterator[str]:
+    """Let both ends send and take a SIP by each family's layout, changed before and in a session."""
+    packet = StandardSip(
+        analog_port=3, gripper_state=6, raw_analog=7, tail=(900, 5), sonar=(SonarReading(2, 40), SonarReading(5, 60))
+    )
+    for before in Profile:
+        for inside in Profile:
+            client = Connection(ConnectionRole.CLIENT, settings=ConnectionSettings(open_delay_ns=NS_PER_MS))
+            server, now = Connection(ConnectionRole.SERVER, identity=WILMA), draw.choice((0, 5, NS_PER_MS))
+            for end in (client, server):
+                end.set_profile(before)
+            client.connect(now)
+            for _ in range(5):
+                for one, other in ((client, server), (server, client)):
+                    one.advance_to(now)
+                    for data in one.take_output():
+                        other.receive(data, now)
+                now += NS_PER_MS
+            for profile in (before, inside):
+                client.set_profile(profile)
+                server.set_profile(profile)
+                server.send(packet, now)
+                client.receive(b"".join(server.take_output()), now)
+                yield from (line for end in (client, server) for line in happened(end))
+
+
+def again(draw: random.Random) -> Iterator[str]:
+    """Let a client give up, lose its robot, and begin again; by each number of attempts."""
+    open_robot, name = StandardSip().to_frame(Profile.P2OS).to_bytes(), WILMA.to_frame().to_bytes()
+    answered = (Frame(b"\0").to_bytes(), Frame(b"\1").to_bytes(), name)
+    for attempts in (1, 2, 3):
+        for kind in ("silent", "open", "reset", "lost"):
+            end, now = Connection(ConnectionRole.CLIENT, settings=ConnectionSettings(sync_attempts=attempts)), 0
+            for _ in range(3):
+                yield tried(end.connect, now)
+                for step in range(12):
+                    if kind == "open" and step % 2 == 0:
+                        end.receive(open_robot, now)
+                    elif kind == "reset" and step < 9:
+                        end.receive(Frame(bytes([draw.choice([*RESET_KINDS])])).to_bytes(), now)
+                    elif kind == "lost" and step < 3 and end.state.name in {"SYNC0", "SYNC1", "SYNC2"}:
+                        end.receive(answered[step], now)
+                    due = end.next_deadline()
+                    now = now + NS_PER_MS if due is None else max(now, due)
+                    end.advance_to(now)
+                    yield from happened(end)
+                    if end.state in IDLE:
+                        break
+
+
 def servers(draw: random.Random) -> Iterator[str]:
     """Let a server meet clients that say its numbers in each order, with and without arguments, and fall silent."""
     for number in range(48):
@@ -447,7 +531,7 @@ def servers(draw: random.Random) -> Iterator[str]:
 
 TRACES: dict[str, Trace] = {
     each.__name__: each
-    for each in (rows, orders, streams, packets, settings_of_robots, counters, clients, opened, servers)
+    for each in (rows, orders, streams, packets, settings_of_robots, counters, clients, opened, layouts, again, servers)
 }
 TRACES["declared"] = declared_of("p2os.protocol", "p2os.protocol.packets")
 test_what_was_approved_is_shown = judge_of(__file__, TRACES)

@@ -1,4 +1,4 @@
-"""Files of other programs, sound and spoilt, as worlds; worlds and robots as their files; as approved."""
+"""Files of other programs, sound and spoilt, as worlds; as approved."""
 
 import json
 import random
@@ -9,20 +9,16 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from p2os.errors import WorldError
-from p2os.pioneer.export import export
-from p2os.pioneer.export.scenes import scene_of
 from p2os.pioneer.world import load_world, parse_world
+from p2os.pioneer.world.formats.local_file import find_local
 from p2os.pioneer.world.formats.meshes.polygon import triangulated
 from p2os.pioneer.world.interchange import transform
 from p2os.pioneer.world.writer import write_world
-from p2os.robots.parameters import load_parameters
 from tests.p2os.pioneer.world import test_importers_gltf as gltf
 from tests.p2os.pioneer.world import test_importers_maps as maps
 from tests.p2os.pioneer.world import test_importers_meshes as meshes
 from tests.p2os.pioneer.world import test_importers_xml as xml
-from tests.p2os.pioneer.world.walks.things import drawn_world
 from tests.tools.suite.approved import Trace, judge_of, refusal, rounded, said, tried
-from tests.tools.suite.declared import declared_of
 
 _NUMBER = re.compile(r"(?<![\w#.])-?\d+(?:\.\d+)?(?![\w.])")
 NUMBERS = ("0", "1", "-1", "2", "0.5", "3", "1000", "1e9", "90", "x", "")
@@ -128,17 +124,33 @@ def worlds(draw: random.Random) -> Iterator[str]:
         yield tried(lambda text=text: rounded(write_world(parse_world(text, "w.toml"))))
 
 
-def exported(draw: random.Random) -> Iterator[str]:
-    for number in range(3):
-        world, robot = drawn_world(draw), load_parameters(("p2dx", "p3at", "amigo")[number])
-        yield from (said(body) for body in scene_of(world, robot).bodies)
-        for ending in ("sdf", "urdf", "xml", "gltf", "glb"):
-            for shown in ((world, robot), (None, robot)):
-                made = export(f"a.{ending}", *shown)
-                yield said((made.losses, [(name, len(data)) for name, data in made.files.items()]))
-                for name, data in made.files.items():
-                    if not name.endswith(("glb", "bin", "png")):
-                        yield rounded(data.decode())
+def named(draw: random.Random) -> Iterator[str]:
+    """Look for files that others name; read joints without ends and places of a map without names."""
+    with tempfile.TemporaryDirectory() as made:
+        folder = Path(made, "robots", "one")
+        (folder / "meshes").mkdir(parents=True)
+        for place in ("wheel.stl", "meshes/arm.stl", "../pkg.stl"):
+            (folder / place).write_text("x")
+        for rest in ("wheel.stl", "meshes/arm.stl", "arm.stl", "other/wheel.stl", "other/meshes/arm.stl", "pkg.stl",
+                     "other/pkg.stl", "robots/pkg.stl", "", "a/", "\0", " wheel.stl "):  # fmt: skip
+            for scheme in ("", "file://", "package://", "model://", "http://", "://"):
+                found = tried(find_local, f"{scheme}{rest}", folder / "robot.urdf")
+                yield f"{scheme}{rest} {found.replace(made, '…')}"
+        for old, new in (
+            ("<parent link", "<x link"),
+            ("<child link", "<child lonk"),
+            ('<parent link="', '<parent link="" x="'),
+        ):
+            yield from seen(folder, "a.urdf", xml.URDF.replace(old, new))
+        kinds = ("ForbiddenLine", "ForbiddenArea", "Goal", "GoalWithHeading", "Dock", "RobotHome", "Reflector", "x", "")
+        for kind in kinds:
+            for rest in (
+                '100 200 30 "" ICON "a name" 0 0 500 700',
+                '100 200 90 "" ICON "" 0 0 500 700',
+                "1 2",
+                "100 200 0",
+            ):
+                yield from seen(folder, "a.map", maps.ARIA.replace("LINES\n", f"Cairn: {kind} {rest}\nLINES\n"))
 
 
 def polygons(draw: random.Random) -> Iterator[str]:
@@ -170,7 +182,6 @@ TRACES: dict[str, Trace] = {
     "obj": walk_of("a.obj", meshes.obj(meshes.WEDGE_Y_UP), 30),
     "stl": walk_of("a.stl", meshes.stl_text(meshes.WEDGE), 30),
     **({"occupancy": walk_of("map.yaml", maps.YAML, 24)} if find_spec("PIL") and find_spec("yaml") else {}),
-    **{each.__name__: each for each in (worlds, exported, polygons, transforms)},
+    **{each.__name__: each for each in (worlds, named, polygons, transforms)},
 }
-TRACES["declared"] = declared_of("p2os.pioneer.export")
 test_what_was_approved_is_shown = judge_of(__file__, TRACES)
