@@ -9,14 +9,27 @@ from collections.abc import Iterator, Mapping
 from random import Random
 from typing import Any
 
-from robot_bench.events.kinds import Clearance, Contact, Event, Note, PinEdge, Pose, Ranges, Text, Wave, WorldChange
+from robot_bench.events.kinds import (
+    Clearance,
+    Contact,
+    Event,
+    Note,
+    PinEdge,
+    Pose,
+    Ranges,
+    Text,
+    Verdict,
+    Wave,
+    WorldChange,
+)
+from robot_bench.events.stream import EventStream
 from robot_bench.scenario.goals.judging import Goal, GoalJudge, RunEnd, judge, load_goal
 from robot_bench.scenario.goals.kinds import every_kind
 from robot_bench.scenario.goals.watch import given_in_words, window_in_words
 from simbase.errors import P2osError
 from tests.robot_bench.recording.records import S
 from tests.robot_bench.scenario.goals.test_goals_on_long_runs import GOALS
-from tests.tools.suite.approved import Trace, judge_of, refusal, said
+from tests.tools.suite.approved import Trace, judge_of, refusal, said, tried
 from tests.tools.suite.declared import declared_of
 
 MS = S // 1000
@@ -177,6 +190,35 @@ def kinds(draw: Random) -> Iterator[str]:
             yield from judged(goal, draw.choice(runs), draw)
 
 
+def published(draw: Random, goals: list[Goal], run: list[Event]) -> Iterator[str]:
+    """Judge a run by its stream: what is published when, which verdict ends it, and by a judge that comes later."""
+    stream, found = EventStream(), GoalJudge(goals, can_tell_world=draw.random() < 0.7)
+    seen, ended = list[Verdict](), list[int]()
+    found.subscribe(stream)
+    stream.subscribe(seen.append, Verdict)
+    found.on_end = lambda: ended.append(stream.released_until)
+    last = run[-1].t + draw.choice((0, 500)) * MS
+    end = RunEnd(last, draw.choice((0, last, last + S)), by_scenario=draw.random() < 0.3)
+    for place, limit in enumerate((last // 3, last // 2, last)):
+        for event in run:
+            if stream.released_until < event.t <= limit:
+                stream.publish(event)
+        if place == 1:
+            found.end_at(end)
+        stream.release(limit)
+        yield said([limit, seen, ended, found.has_ended_run, found.missed])
+        seen.clear()
+    others = goals[1:] if draw.random() < 0.5 else goals
+    later = GoalJudge(others)
+    later.restore(GoalJudge(goals).snapshot())
+    yield said([later.is_behind, len(found.goals), found.margins(last), found.finish(end)])
+    later.subscribe(stream)
+    later.catch_up(run, last)
+    yield said([later.is_behind, later.has_ended_run, later.finish(end), stream.pending()])
+    for wrong in (None, 3, {"goals": ()}):
+        yield tried(later.restore, wrong)
+
+
 def together(draw: Random) -> Iterator[str]:
     """Judge runs by several goals at once, excused ones among them, as reports do."""
     for _ in range(12):
@@ -190,6 +232,7 @@ def together(draw: Random) -> Iterator[str]:
             except P2osError as error:
                 yield refusal(error)
         run = [*small_run(draw)]
+        yield from published(draw, goals, run)
         for planned in (0, run[-1].t + S):
             for can_tell in (True, False):
                 yield said(judge(run, goals, end_ns=run[-1].t, planned_ns=planned, can_tell_world=can_tell))
