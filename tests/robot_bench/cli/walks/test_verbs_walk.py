@@ -17,7 +17,7 @@ import typer
 
 from p2os.cli.main import make_app
 from p2os.cli.main import run as p2os
-from robot_bench.cli import board, names, table
+from robot_bench.cli import board, names, sweep, table
 from robot_bench.cli import run as run_verb
 from robot_bench.cli.campaigns import mutate, shrink
 from robot_bench.cli.experiments import fit, sensitivity, validate
@@ -29,6 +29,7 @@ from robot_bench.experiments.sensitivity import ParameterEffect, SampleDesign, r
 from robot_bench.experiments.validation.figures import Figure, FigureTolerance, Missing
 from robot_bench.experiments.validation.trials import TrialResult, Variant
 from robot_bench.recording.run_folder import used_folder
+from robot_bench.recording.summary import INTERRUPTED
 from robot_bench.run import RunResult
 from robot_bench.scenario.loading import load_scenario
 from robot_bench.scenario.scenario import Scenario
@@ -539,6 +540,88 @@ def studies(draw: Random) -> Iterator[str]:
     yield said(draw.random())
 
 
+SETTINGS: tuple[tuple[tuple[str, object], ...], ...] = (
+    (),
+    (("threshold_m", 0.4), ("start.x_m", 1)),
+    (("threshold_m", 0.6), ("start.x_m", 1)),
+    (("a.x_m", "it's"), ("b.x_m", [1, 2])),
+)
+
+
+def swept(draw: Random, count: int) -> sweep.SweepResult:
+    """Return what came of runs of a scenario, that differ in their seeds and in parameters."""
+    dodge = load_scenario("dodge")
+    keys = draw.choice((SETTINGS[:1], SETTINGS[1:3], SETTINGS[3:]))
+    rows, outcomes = list[sweep.SweepRow](), list[dict[str, object]]()
+    hashes = draw.choice((("a0" * 32,), ("a0" * 32, "b1" * 32), ("a0" * 32, None)))
+    for number in range(count):
+        settings = keys[number * len(keys) // count]
+        made: Any = sweep.SweepRow(
+            replace(dodge, seed=number), settings, sweep.command("dodge", ["--mode", "direct"], settings, number)
+        )
+        rows.append(made)
+        failures = draw.choice((
+            [], [], [], ["not run"], [f"{INTERRUPTED} (SIGINT)"], ["no_collision: it hit", "second\x00 \ufffe"],
+            ["not run because of it"],
+        ))  # fmt: skip
+        outcomes.append(
+            {
+                "passed": not failures,
+                "failures": failures,
+                "body": draw.choice(("kinematic", "bullet", None)),
+                "virtual_s": draw.choice((None, 12.3456)),
+                "distance_m": draw.choice((None, 0, 1.23456)),
+                "min_clearance_m": draw.choice((None, 0.12345)),
+                "trace_sha256": draw.choice(hashes),
+                "wall_s": draw.choice((None, 0.5)),
+                "folder": draw.choice((None, "runs/1")),
+            }
+        )
+    return sweep.SweepResult(rows, outcomes, draw.random() < 0.3, Path("runs"))
+
+
+def sweeps(draw: Random) -> Iterator[str]:
+    """Print sweeps of few runs and of many, as a table, as JSON and for CI; and carry some out."""
+    with in_folder():
+        for count in (1, 2, 4, 7, 20, 40, 41, 60):
+            done = swept(draw, count)
+            yield from printed(sweep.print_sweep, done)
+            yield said(sweep.as_json(done))
+            sweep.write_junit(done, Path("r.xml"))
+            yield Path("r.xml").read_text(encoding="utf-8")
+            yield said([sweep._places(done.rows), [sweep.word_of(found) for found in done.outcomes]])
+            yield said([sweep.KEPT[kept](passed) for kept in sweep.KEPT for passed in (True, False)])
+        yield tried(sweep.refuse_junit, Path("none", "r.xml"))
+        yield tried(lambda: sweep._places([done.rows[0], done.rows[0]]))
+        reported: list[object] = []
+
+        def run(scenario: Scenario, folder: Path, **named: Any) -> RunResult:
+            named["on_progress"](None)
+            reported.append([scenario.seed, folder, named["force"], [named["is_kept"](one) for one in (True, False)]])
+            folder.mkdir(parents=True, exist_ok=scenario.seed % 2 == 0)
+            return replace(result_of(passed=scenario.seed % 3 > 0, extra=1), folder=folder)
+
+        def in_processes(job: Any, count: int, **named: Any) -> bool:
+            reported.append([count, named["at_once"]])
+            for number in range(count - 1):
+                named["on_done"](number, job(number, lambda: reported.append("look")))
+            return draw.random() < 0.5
+
+        with (
+            mock.patch.object(sweep, "run_scenario", run),
+            mock.patch.object(sweep, "run_in_processes", in_processes),
+            mock.patch.object(sweep, "load_once", lambda scenario: reported.append(scenario.name)),
+        ):
+            for number, kept in enumerate(sweep.KEPT):
+                rows = swept(draw, 5).rows
+                named = {"jobs": 2, "kept": kept, "raise_if_interrupted": print, "force": number == 1}
+                found: list[sweep.SweepResult] = []
+                place = None if number == 2 else Path(f"s{number}")
+                yield from printed(lambda r=rows, p=place, n=named, f=found: f.append(sweep.run_sweep(r, p, **n)))
+                yield said([reported, [(one.folder, one.was_interrupted, one.outcomes) for one in found]])
+                reported.clear()
+
+
 def projects(draw: Random) -> Iterator[str]:
     """Look at folders of projects of every kind."""
     elf = b"\x7fELF"
@@ -625,6 +708,7 @@ TRACES = {
     "handed_on": handed_on,
     "tables": tables,
     "studies": studies,
+    "sweeps": sweeps,
     "projects": projects,
     "completions": completions,
     "declared": declared_of(
