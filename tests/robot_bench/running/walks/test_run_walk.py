@@ -139,6 +139,25 @@ do = "end"
 """
 
 
+WITH_FAULTS = """
+firmware = "motors.elf"
+world = "room"
+mode = "adapter"
+duration_s = 0.1
+[[fault]]
+at_s = 0.05
+fault = "link-down"
+[[when]]
+event = "contact"
+do = "inject"
+fault = "link-down"
+[[hand]]
+at_s = 0.05
+do = "inject"
+fault = "link-down"
+"""
+
+
 def scenarios(folder: Path) -> Iterator[tuple[str, Scenario]]:
     texts = {
         "adapter": HEAD.format(firmware=hurried("dodge", 5), mode="adapter", duration=1.0) + THINGS + FAULTS,
@@ -331,6 +350,14 @@ def refusals(_draw: Random) -> Iterator[str]:
         first.restart(kept)
         first.run_until("0.04 s")
         yield said([count > 0, len(heard) == count, first.now, first.on_slice is None, first._checkpoints])
+    with TemporaryDirectory(prefix="p2os-test-") as name:
+        (Path(name) / "mine.toml").write_text(WITH_FAULTS, encoding="utf-8")
+        mine = load_scenario(str(Path(name, "mine.toml")))
+        calm: dict[str, Any] = {"mode": "direct", "faults": (), "triggers": (), "hands": ()}
+        for kept_one in ("faults", "triggers", "hands"):
+            for where in (mine.where, ""):
+                changed = replace(mine, **calm | {kept_one: getattr(mine, kept_one), "mode": "direct", "where": where})
+                yield f"{kept_one} {tried(lambda c=changed: Bench(c).now)}".replace(name, "HERE")
     chip: Any = SimpleNamespace(usart1=None)
     board = Acted(calls, "recorder")
     for measured in ({"coverage": False, "profile": False}, {"coverage": True, "profile": False}, {
