@@ -27,6 +27,7 @@ from robot_bench.campaign.margin import goal_margin, margin
 from robot_bench.campaign.pages import page
 from robot_bench.campaign.pages.comment import _plain, write_comment
 from robot_bench.campaign.results import PointRate, Whole
+from robot_bench.campaign.search import Listed
 from robot_bench.campaign.space import Space
 from robot_bench.campaign.suggestion import suggested
 from robot_bench.campaign.trial import GoalResult, HullContact, Outcome, Trial, TrialVerdict
@@ -168,7 +169,7 @@ def shown(done: Whole) -> Iterator[str]:
                     row.proposal.faults, row.new, row.is_drawn])  # fmt: skip
         yield said([(run.stage, run.outcome.sha256, run.outcome.verdict, run.cpu_s, run.margin) for run in row.runs])
     yield from printed(done, json_output=False)
-    if done.was_interrupted or done.campaign.batch == 4:
+    if done.was_interrupted or done.campaign.batch == 8:
         yield from printed(done, json_output=True)
     for section in page._sections(done):
         for block in (section.title, section.note, *section.blocks):
@@ -197,15 +198,18 @@ def campaigns(_draw: Random) -> Iterator[str]:
             scenes[one.sha256] = scene(one)
         return scenes[one.sha256]
 
+    answers: list[object] = []  # what a search is given
+
     with (
         TemporaryDirectory(prefix="p2os-test-") as name,
+        mock.patch.object(Listed, "tell", lambda _self, given: answers.extend(given)),
         mock.patch.object(whole_module, "last_moment", moment),
         mock.patch.object(diversity, "_scene", seen),
     ):
         os.chdir(name)
         try:
             for number, (search, batch, runs, confirmations, budget, until) in enumerate((
-                ("random", 4, 22, 7, "", 10**6), ("grid", 5, 10, 20, "virtual_hours = 0.008", 10**6),
+                ("random", 8, 22, 16, "", 10**6), ("grid", 5, 10, 20, "virtual_hours = 0.008", 10**6),
                 ("random", 3, 12, 2, "minutes = 1.5", 10**6), ("random", 4, 8, 3, "", 9),
             )):  # fmt: skip
                 place = Path(f"c{number}")
@@ -216,7 +220,7 @@ def campaigns(_draw: Random) -> Iterator[str]:
                 campaign = begin(
                     place / "camp.toml", place / "kept", firmware=None, overrides={"budget": {"runs": runs}}
                 )
-                ticks = itertools.count(0, 60 * 10**9)
+                ticks = itertools.count(7 * 10**12, 60 * 10**9)
                 reported: list[tuple[int, int]] = []
 
                 def note(progress: CampaignProgress, reported: list[tuple[int, int]] = reported) -> None:
@@ -228,6 +232,11 @@ def campaigns(_draw: Random) -> Iterator[str]:
                         campaign, place / "kept", workers, clock=lambda ticks=ticks: next(ticks), on_run=note
                     )
                     yield said([search, reported[-1:], workers.count, sum(workers.anew), done.was_interrupted])
+                    yield said([
+                        (one.margin, one.ended, len(one.reached), sorted(map(str, one.reached))[:3], sorted(one.acting),
+                         one.is_excused) for one in answers
+                    ])  # fmt: skip
+                    answers.clear()
                     if not done.was_interrupted:
                         break
                     campaign = resume(place / "kept")
