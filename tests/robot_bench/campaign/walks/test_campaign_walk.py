@@ -30,10 +30,11 @@ from robot_bench.campaign.results import PointRate, Whole
 from robot_bench.campaign.search import Listed
 from robot_bench.campaign.space import Space
 from robot_bench.campaign.suggestion import suggested
-from robot_bench.campaign.trial import GoalResult, HullContact, Outcome, Trial, TrialVerdict
+from robot_bench.campaign.trial import GoalResult, HullContact, Outcome, SeenSoFar, Trial, TrialVerdict
 from robot_bench.campaign.variants import diversity
 from robot_bench.campaign.whole import begin, carry_out, points_of, resume
 from robot_bench.cli.campaigns import campaign as verb
+from robot_bench.events.kinds import Contact, Note, Pose, Text
 from robot_bench.scenario.loading import load_scenario
 from simbase.errors import P2osError
 from tests.robot_bench.campaign.test_campaign import Shuffled
@@ -337,6 +338,26 @@ def figures(draw: Random) -> Iterator[str]:
     yield said([page._correlation([(1.0, 1.0), (1.0, 2.0)]), page._last(None)])
 
 
+def seen_so_far(draw: Random) -> Iterator[str]:
+    """Take what runs show: places, contacts, lines with figures in them, and more of these than are kept."""
+    for most in (3, 200, 230):
+        seen, words = SeenSoFar(), [f"line {chr(33 + n // 90)}{chr(33 + n % 90)}" for n in range(most)]
+        for number in range(700):
+            t = 100 * 10**6 * number + draw.choice((0, 0, 1))
+            seen._take(Pose(t=t, x=number * 999, y=-number * 1001, z=0, heading=0, pitch=0, left=0, right=0,
+                            left_angle=0, right_angle=0, collisions=0))  # fmt: skip
+            line = draw.choice(words) if number > most else words[number % most]
+            line = line if draw.random() < 0.9 else draw.choice((f"x={number} y={-number / 8}", "", words[0]))
+            seen._take(Text(t=t, data=f"{line}\r\n".encode() + b"\xff" * (number == 9)))
+            if number % 300 == 0:
+                seen._take(Contact(t=t, what="'box'", x_m=0.1 * number, y_m=0.0, part="front"))
+            if number % 233 == 0:
+                seen._take(Note(t=t, who="body", what="x"))  # what it did not ask for
+        yield said([most, len(seen.printed), len(seen.transitions), seen.last, seen.hits, seen.way_mm[:4],
+                    len(seen.way_mm)])  # fmt: skip
+        yield f"{[*seen.printed][:9]} {[*seen.printed][-2:]} {[*seen.transitions][:9]} {[*seen.transitions][-2:]}"
+
+
 def drawn_things(draw: Random) -> Iterator[str]:
     """Place things of each kind in rooms: where they are wanted, nearby, or nowhere."""
     world = load_world("room")
@@ -364,7 +385,7 @@ def drawn_things(draw: Random) -> Iterator[str]:
 
 
 TRACES: dict[str, Trace] = {
-    "campaigns": campaigns, "files": files, "figures": figures, "things": drawn_things,
+    "campaigns": campaigns, "files": files, "figures": figures, "things": drawn_things, "seen": seen_so_far,
 }  # fmt: skip
 for _package in ("campaign", "campaign.reaching", "campaign.workers", "campaign.pages"):
     TRACES[f"declared in {_package}"] = declared_of(f"robot_bench.{_package}")
