@@ -9,7 +9,7 @@ from typing import Any
 from unittest import mock
 
 from p2os.view.header import PageHeader
-from robot_bench.events.kinds import Contact
+from robot_bench.events.kinds import Contact, Note
 from robot_bench.experiments.validation import experiments, page, sensors, trials
 from robot_bench.experiments.validation.encoders import (
     count_figures,
@@ -85,6 +85,9 @@ def validations(draw: Random) -> Iterator[str]:
         record = MadeRun(nominal=nominal, legs=legs, late_s=draw.choice((0.0, 0.06, 0.3)), rest_s=2.0, fault=fault,
                          fast=draw.choice((1.0, 1.01, 1.2)), steep=draw.choice((1.0, 1.3)), seen=seen,
                          readings=readings).record()  # fmt: skip
+        record.events[:0] = [
+            Note(t=100, who=who, what=what) for who, what in (("body", "driving"), ("adapter", "lost"))
+        ] * draw.choice((0, 1))
         record.contacts = [Contact(t=NS_PER_S, what="'box'", x_m=1.0, y_m=0.5, part="")] * draw.choice((0, 2))
         record = draw.choice((record, record, replace(record, events=[]), replace(record, poses=record.poses[:9])))
         gates = nominal_of("adapter", "sensors")[1] if number < 4 else scenario

@@ -54,7 +54,9 @@ def numbers(draw: Random, key: str, value: Any) -> Any:  # noqa: PLR0911 - by th
     if isinstance(value, list):
         if key == "area_m":
             low = [draw.choice((-0.3, 0.0, 0.1)) for _ in range(2)]
-            return [*low, *(one + draw.choice((0.2, 0.5, 3.0)) for one in low)]
+            if draw.random() < 0.15:
+                return draw.choice(([*low, 1.0], [*low, 1.0, 1.0, 1.0], [*low, True, 1.0], [*low, "1", 1.0]))
+            return [*low, *(one + draw.choice((0.2, 0.5, 3.0, 3.0, 0.0, -0.1)) for one in low)]
         return value if draw.random() < 0.8 else value[::-1]
     if isinstance(value, bool | str) or draw.random() < 0.2:
         return value
