@@ -622,6 +622,48 @@ def sweeps(draw: Random) -> Iterator[str]:
                 reported.clear()
 
 
+def validations(_draw: Random) -> Iterator[str]:
+    """Hand on what is to be validated: in variants of the bench, and at a port, where a person is asked once a room."""
+    reported: list[object] = []
+    some = [validate.EXPERIMENTS[name] for name in ("motors", "slip", "encoders", "sensors", "sensors-all")]
+
+    def port(runs: Any, drive: Any, folder: Path, *, settings: object) -> list[TrialResult]:
+        reported.append([[[one.name for one in run.experiments] for run in runs], folder, settings])
+        for run in [*runs, *runs[:1]]:
+            drive(run, folder / "run")
+        return []
+
+    def trials(chosen: Any, variants: Any, folder: Path, **named: Any) -> list[TrialResult]:
+        named["on_done"](1, 2)
+        named["in_processes"](print, 3, print)
+        plain = {key: value for key, value in named.items() if key not in {"on_done", "in_processes"}}
+        reported.append([[one.name for one in chosen], variants, folder, plain])
+        return []
+
+    def processes(_job: object, count: int, *, at_once: int, **_: object) -> bool:
+        reported.append([count, at_once])
+        return True
+
+    def driven(scenario: Scenario, *words: object, **named: object) -> None:
+        reported.append(["drive", scenario.name, words, named])
+
+    with (
+        mock.patch.object(validate, "run_port", port), mock.patch.object(validate, "run_trials", trials),
+        mock.patch.object(validate, "run_in_processes", processes), mock.patch.object(validate, "drive_port", driven),
+        mock.patch.object(validate, "load_once", lambda one: reported.append(["load", one.name, one.body])),
+        mock.patch.object(validate, "ask", lambda one, where: reported.append(["ask", one.name, where])),
+    ):  # fmt: skip
+        for keys, yes in ((True, False), (False, True)):
+            with mock.patch.object(validate, "has_keyboard", lambda has=keys: has):
+                yield from printed(validate._run_at_port, some, Path("v"), [("threshold_m", 0.5)], "tcp:x", yes=yes)
+            yield said(reported)
+            reported.clear()
+        chosen = [Variant("direct", "", body) for body in ("kinematic", "bullet", "kinematic")]
+        settings = [("threshold_m", 0.5)]
+        yield from printed(validate._run_all, some, chosen, Path("v"), settings, worlds=["room"], seeds=[1], jobs=2)
+        yield said(reported)
+
+
 def projects(draw: Random) -> Iterator[str]:
     """Look at folders of projects of every kind."""
     elf = b"\x7fELF"
@@ -709,6 +751,7 @@ TRACES = {
     "tables": tables,
     "studies": studies,
     "sweeps": sweeps,
+    "validations": validations,
     "projects": projects,
     "completions": completions,
     "declared": declared_of(
