@@ -391,8 +391,8 @@ def numbers(_draw: Random) -> Iterator[str]:
 
 
 TRACES: dict[str, Trace] = {
-    "runs": runs, "together": together, "expectations": expectations, "folders": folders, "numbers": numbers,
-    "refusals": refusals,
     "declared": declared_of("robot_bench", "robot_bench.bench", "robot_bench.running"),
+    "refusals": refusals, "numbers": numbers, "together": together, "expectations": expectations, "runs": runs,
+    "folders": folders,
 }  # fmt: skip
 test_what_short_runs_are_is_what_was_approved = judge_of(__file__, TRACES)
