@@ -217,10 +217,8 @@ def print_sweep(done: SweepResult) -> None:
 
 def _are_seeds_alike(done: SweepResult) -> bool:
     """Tell whether the seeds made no difference to any row, where there were several."""
-    hashes: dict[tuple[Setting, ...], list[object]] = {}
-    for row, found in zip(done.rows, done.outcomes, strict=True):
-        hashes.setdefault(row.settings, []).append(found.get("trace_sha256"))
-    return all(are_alike(found) for found in hashes.values())
+    groups = groupby(zip(done.rows, done.outcomes, strict=True), key=lambda pair: pair[0].settings)
+    return all(are_alike(found.get("trace_sha256") for _, found in group) for _, group in groups)
 
 
 def _each(done: SweepResult) -> Table:

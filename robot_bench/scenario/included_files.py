@@ -13,6 +13,7 @@ A file that is named in an included file is looked for beside that one.
 Invariant: of each key that a message may name, the file and line are those where it was set.
 """
 
+import json
 import os
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
@@ -158,23 +159,21 @@ def read_tables(path: Path, settings: Sequence[Setting] = (), set_by: str = "--s
     places: dict[tuple[str, int, str], str] = {}
     for key, value in settings:
         places[set_key(found.table, key, value)] = f"{set_by} {key}"
-    texts = (
-        [text.partition("\n")[2] for text in found.texts]
-        if len(found.texts) == 1
-        else [f"# {text}" for text in found.texts]
-    )
+    texts = [text.partition("\n")[2] for text in found.texts]
+    if len(found.texts) > 1:
+        texts = [f"# {text}" for text in found.texts]
     text = "\n".join([*texts, *(f"# {set_by} {key}={as_toml(value)}" for key, value in settings)])
     return ScenarioTable(table=found.table, source=MergedSource(found.parts, places), text=text)
 
 
-def as_toml(value: object) -> str:
-    """Return a value as one types it behind `--set KEY=`."""
-    if isinstance(value, bool):
-        return str(value).lower()
+def as_toml(value: object, *, is_inside: bool = False) -> str:
+    """Return a value as one types it behind `--set KEY=`; within a list or a table texts have quotes."""
     if isinstance(value, list):
-        return f"[{', '.join(map(as_toml, value))}]"
-    if isinstance(value, str) and parsed(value) != value:
-        return f'"{value}"'
+        return f"[{', '.join(as_toml(one, is_inside=True) for one in value)}]"
+    if isinstance(value, dict):
+        return f"{{{', '.join(' = '.join(as_toml(one, is_inside=True) for one in row) for row in value.items())}}}"
+    if isinstance(value, bool) or (isinstance(value, str) and (is_inside or parsed(value.strip()) != value)):
+        return json.dumps(value, ensure_ascii=False)
     return str(value)
 
 

@@ -156,7 +156,7 @@ def _motion(record: RunRecord, nominal: Nominal, spans: Sequence[tuple[Pair, Pai
         poses = poses_between(record, begin + round(wait * NS_PER_S), end)
         if poses:
             steady += [_steady(nominal, side, poses, pair) for side in _SIDES]
-        if len(poses) > 1 and poses[-1].t - poses[0].t >= LEAST_SPAN_NS:
+        if poses and poses[-1].t - poses[0].t >= LEAST_SPAN_NS:
             last = zip(steady[-2:], _SIDES, strict=True)
             turned += [_turned(nominal, figure, side, poses, pair) for figure, side in last]
         kind = _kind_of_change(before, pair)

@@ -188,7 +188,7 @@ class WaveWithin(Watch):
         self._name, self._wire = table.pin, table.wire
         self.wires = (self._wire,)
         self._hz_bounds = table.least_hz or 0.0, table.most_hz or math.inf
-        self._duty_bounds = table.least_duty or 0.0, 1.0 if table.most_duty is None else table.most_duty
+        self._duty_bounds = table.least_duty or 0.0, math.inf if table.most_duty is None else table.most_duty
         self._periods = table.periods
         self._from, self._to = table.span
         self._rise: Nanos | None = None

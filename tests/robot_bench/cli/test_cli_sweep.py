@@ -54,6 +54,16 @@ def test_a_row_for_each_seed_and_nothing_is_left_of_what_passed(capsys: pytest.C
     assert list(Path("runs").iterdir()) == []
 
 
+def test_lists_are_swept_and_typed_again(capsys: pytest.CaptureFixture[str]) -> None:
+    """The summary compares the seeds of each row, and the command sets the list again, not a text."""
+    name = make(f'{LEAST}[sweep]\nrecord = [["spi1"], ["can", "usb"]]\n')
+    assert p2os(["run", name, "-j", "2"]) == 0
+    out = capsys.readouterr().out
+    assert "2 passed, 0 failed of 2" in out
+    again = next(line for line in out.splitlines() if line.startswith("one of them again: "))
+    assert p2os(shlex.split(again.partition(": p2os ")[2])) == 0
+
+
 def test_a_sweep_fails_with_1_and_says_which_row_and_how_to_see_it_again(capsys: pytest.CaptureFixture[str]) -> None:
     name = make(f"{LEAST}{RIGHT}[sweep]\nstart.x_m = {{ from = -0.5, to = 0.5, step = 0.5 }}\n")
     assert p2os(["run", name, "-j", "2", "--junit", "r.xml", "--out", "there"]) == 1

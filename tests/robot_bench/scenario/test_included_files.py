@@ -3,11 +3,11 @@
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from p2os.errors import ScenarioError
-from robot_bench.scenario.included_files import MOST_FILES, as_toml, parsed, read_setting
+from robot_bench.scenario.included_files import MOST_FILES, as_toml, read_setting
 from robot_bench.scenario.loading import load_scenario, read_scenario
 from robot_bench.scenario.scenario import Scenario
 from robot_bench.scenario.sweep import read_seeds, rows
@@ -154,13 +154,21 @@ def test_files_cannot_be_named_beside_the_file_that_names_them(setting: str, tmp
     assert refused(path, setting) == f"--set {key}: files are named in the scenario's own file"
 
 
-PLAIN = st.text(st.characters(codec="ascii", exclude_categories=["Cc"], exclude_characters='"\\ '), min_size=1)
+TEXTS = st.text(st.characters(codec="utf-8", exclude_characters="\x7f"), max_size=9)
 NUMBERS = st.one_of(st.booleans(), st.integers(), st.floats(allow_nan=False, allow_infinity=False))
+VALUES = st.recursive(
+    st.one_of(NUMBERS, TEXTS),
+    lambda inside: st.one_of(st.lists(inside, max_size=3), st.dictionaries(TEXTS, inside, max_size=2)),
+    max_leaves=5,
+)
 
 
-@given(st.one_of(NUMBERS, PLAIN, st.lists(NUMBERS, max_size=3)))
+@given(VALUES)
+@example(["spi1"])
+@example({"x_m": 1, "names": ["a"]})
+@example(" 1")
 def test_a_value_that_is_typed_again_is_the_same(value: object) -> None:
-    again = parsed(as_toml(value))
+    _, again = read_setting(f"key={as_toml(value)}")
     assert again == value
     assert type(again) is type(value)
 

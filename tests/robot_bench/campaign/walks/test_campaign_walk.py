@@ -27,12 +27,14 @@ from robot_bench.campaign.margin import goal_margin, margin
 from robot_bench.campaign.pages import page
 from robot_bench.campaign.pages.comment import _plain, write_comment
 from robot_bench.campaign.results import PointRate, Whole
+from robot_bench.campaign.search import Listed
 from robot_bench.campaign.space import Space
 from robot_bench.campaign.suggestion import suggested
-from robot_bench.campaign.trial import GoalResult, HullContact, Outcome, Trial, TrialVerdict
+from robot_bench.campaign.trial import GoalResult, HullContact, Outcome, SeenSoFar, Trial, TrialVerdict
 from robot_bench.campaign.variants import diversity
 from robot_bench.campaign.whole import begin, carry_out, points_of, resume
 from robot_bench.cli.campaigns import campaign as verb
+from robot_bench.events.kinds import Contact, Note, Pose, Text
 from robot_bench.scenario.loading import load_scenario
 from simbase.errors import P2osError
 from tests.robot_bench.campaign.test_campaign import Shuffled
@@ -168,7 +170,7 @@ def shown(done: Whole) -> Iterator[str]:
                     row.proposal.faults, row.new, row.is_drawn])  # fmt: skip
         yield said([(run.stage, run.outcome.sha256, run.outcome.verdict, run.cpu_s, run.margin) for run in row.runs])
     yield from printed(done, json_output=False)
-    if done.was_interrupted or done.campaign.batch == 4:
+    if done.was_interrupted or done.campaign.batch == 8:
         yield from printed(done, json_output=True)
     for section in page._sections(done):
         for block in (section.title, section.note, *section.blocks):
@@ -197,15 +199,18 @@ def campaigns(_draw: Random) -> Iterator[str]:
             scenes[one.sha256] = scene(one)
         return scenes[one.sha256]
 
+    answers: list[object] = []  # what a search is given
+
     with (
         TemporaryDirectory(prefix="p2os-test-") as name,
+        mock.patch.object(Listed, "tell", lambda _self, given: answers.extend(given)),
         mock.patch.object(whole_module, "last_moment", moment),
         mock.patch.object(diversity, "_scene", seen),
     ):
         os.chdir(name)
         try:
             for number, (search, batch, runs, confirmations, budget, until) in enumerate((
-                ("random", 4, 22, 7, "", 10**6), ("grid", 5, 10, 20, "virtual_hours = 0.008", 10**6),
+                ("random", 8, 22, 16, "", 10**6), ("grid", 5, 10, 20, "virtual_hours = 0.008", 10**6),
                 ("random", 3, 12, 2, "minutes = 1.5", 10**6), ("random", 4, 8, 3, "", 9),
             )):  # fmt: skip
                 place = Path(f"c{number}")
@@ -216,7 +221,7 @@ def campaigns(_draw: Random) -> Iterator[str]:
                 campaign = begin(
                     place / "camp.toml", place / "kept", firmware=None, overrides={"budget": {"runs": runs}}
                 )
-                ticks = itertools.count(0, 60 * 10**9)
+                ticks = itertools.count(7 * 10**12, 60 * 10**9)
                 reported: list[tuple[int, int]] = []
 
                 def note(progress: CampaignProgress, reported: list[tuple[int, int]] = reported) -> None:
@@ -228,6 +233,11 @@ def campaigns(_draw: Random) -> Iterator[str]:
                         campaign, place / "kept", workers, clock=lambda ticks=ticks: next(ticks), on_run=note
                     )
                     yield said([search, reported[-1:], workers.count, sum(workers.anew), done.was_interrupted])
+                    yield said([
+                        (one.margin, one.ended, len(one.reached), sorted(map(str, one.reached))[:3], sorted(one.acting),
+                         one.is_excused) for one in answers
+                    ])  # fmt: skip
+                    answers.clear()
                     if not done.was_interrupted:
                         break
                     campaign = resume(place / "kept")
@@ -328,6 +338,26 @@ def figures(draw: Random) -> Iterator[str]:
     yield said([page._correlation([(1.0, 1.0), (1.0, 2.0)]), page._last(None)])
 
 
+def seen_so_far(draw: Random) -> Iterator[str]:
+    """Take what runs show: places, contacts, lines with figures in them, and more of these than are kept."""
+    for most in (3, 200, 230):
+        seen, words = SeenSoFar(), [f"line {chr(33 + n // 90)}{chr(33 + n % 90)}" for n in range(most)]
+        for number in range(700):
+            t = 100 * 10**6 * number + draw.choice((0, 0, 1))
+            seen._take(Pose(t=t, x=number * 999, y=-number * 1001, z=0, heading=0, pitch=0, left=0, right=0,
+                            left_angle=0, right_angle=0, collisions=0))  # fmt: skip
+            line = draw.choice(words) if number > most else words[number % most]
+            line = line if draw.random() < 0.9 else draw.choice((f"x={number} y={-number / 8}", "", words[0]))
+            seen._take(Text(t=t, data=f"{line}\r\n".encode() + b"\xff" * (number == 9)))
+            if number % 300 == 0:
+                seen._take(Contact(t=t, what="'box'", x_m=0.1 * number, y_m=0.0, part="front"))
+            if number % 233 == 0:
+                seen._take(Note(t=t, who="body", what="x"))  # what it did not ask for
+        yield said([most, len(seen.printed), len(seen.transitions), seen.last, seen.hits, seen.way_mm[:4],
+                    len(seen.way_mm)])  # fmt: skip
+        yield f"{[*seen.printed][:9]} {[*seen.printed][-2:]} {[*seen.transitions][:9]} {[*seen.transitions][-2:]}"
+
+
 def drawn_things(draw: Random) -> Iterator[str]:
     """Place things of each kind in rooms: where they are wanted, nearby, or nowhere."""
     world = load_world("room")
@@ -355,8 +385,9 @@ def drawn_things(draw: Random) -> Iterator[str]:
 
 
 TRACES: dict[str, Trace] = {
-    "campaigns": campaigns, "files": files, "figures": figures, "things": drawn_things,
+    "files": files, "figures": figures, "things": drawn_things, "seen": seen_so_far,
 }  # fmt: skip
 for _package in ("campaign", "campaign.reaching", "campaign.workers", "campaign.pages"):
     TRACES[f"declared in {_package}"] = declared_of(f"robot_bench.{_package}")
+TRACES["campaigns"] = campaigns  # last, for it takes longest
 test_what_campaigns_come_to_is_what_was_approved = judge_of(__file__, TRACES)

@@ -1,14 +1,12 @@
-"""The bench's verbs: their options, what they refuse, what they hand on, and how they print what came of it."""
+"""The bench's verbs: their options, what they refuse, and what they hand on."""
 
 import contextlib
-import io
 import os
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from random import Random
 from shutil import rmtree
-from tempfile import TemporaryDirectory
 from types import SimpleNamespace
 from typing import Any
 from unittest import mock
@@ -17,52 +15,16 @@ import typer
 
 from p2os.cli.main import make_app
 from p2os.cli.main import run as p2os
-from robot_bench.cli import board, names, table
+from robot_bench.cli import names
 from robot_bench.cli import run as run_verb
-from robot_bench.cli.campaigns import mutate, shrink
-from robot_bench.cli.experiments import fit, sensitivity, validate
 from robot_bench.cli.needs import NEEDS
 from robot_bench.cli.project import existing
-from robot_bench.experiments.fitting.least_squares import Estimate, Fit
-from robot_bench.experiments.fitting.umbmark import Correction
-from robot_bench.experiments.sensitivity import ParameterEffect, SampleDesign, read_range
-from robot_bench.experiments.validation.figures import Figure, FigureTolerance, Missing
-from robot_bench.experiments.validation.trials import TrialResult, Variant
-from robot_bench.recording.run_folder import used_folder
 from robot_bench.run import RunResult
 from robot_bench.scenario.loading import load_scenario
 from robot_bench.scenario.scenario import Scenario
-from robot_bench.wires.board_test.verdicts import BoardVerdict, VerdictRow
-from simbase.errors import FileError, P2osError
-from tests.tools.suite.approved import judge_of, rounded, said, tried
+from tests.robot_bench.cli.walks.printed import in_folder, printed, result_of
+from tests.tools.suite.approved import judge_of, said, tried
 from tests.tools.suite.declared import declared_of
-
-
-@contextlib.contextmanager
-def in_folder() -> Iterator[Path]:
-    """Stand in an empty folder, at a terminal of 80 columns that is none."""
-    before = Path.cwd()
-    with TemporaryDirectory(prefix="p2os-test-") as name, mock.patch.dict(os.environ, {"COLUMNS": "80"}):
-        os.chdir(name)
-        try:
-            yield Path(name)
-        finally:
-            os.chdir(before)
-
-
-def printed(action: Any, *arguments: object, **named: object) -> Iterator[str]:
-    """Yield what something prints, and how it ends."""
-    out, err = io.StringIO(), io.StringIO()
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-        try:
-            ended = action(*arguments, **named)
-        except typer.Exit as error:
-            ended = f"exit {error.exit_code}"
-        except P2osError as error:
-            ended = f"{error} ({error.hint})"
-    yield from (rounded(line) for line in out.getvalue().splitlines())
-    yield from (f"! {rounded(line)}" for line in err.getvalue().splitlines())
-    yield f"= {ended}"
 
 
 def verbs(command: Any, path: str = "p2os") -> Iterator[tuple[str, Any]]:
@@ -277,39 +239,6 @@ def scenario_words(one: object) -> object:
     ]
 
 
-OUTCOME: dict[str, object] = {
-    "scenario": "mine",
-    "world": "room",
-    "mode": "adapter",
-    "body": "kinematic",
-    "seed": 3,
-    "virtual_s": 12.34,
-    "passed": True,
-    "real_time_factor": 7.77,
-    "distance_m": 1.234,
-    "collisions": 2,
-    "min_clearance_m": 0.1234,
-    "usart_baud": 9600,
-    "usart_lines": 2,
-    "usart_last": "bye",
-    "coverage": None,
-    "trace_sha256": "0123456789abcdef0123",
-    "last_blocks": None,
-    "notes": [],
-    "hits": [],
-    "failures": [],
-    "goals_met": ["a", "b"],
-    "goals_not_judged": [],
-    "explained": None,
-}
-
-
-def result_of(**changes: object) -> RunResult:
-    outcome: Any = OUTCOME | changes
-    stopped = bool(changes.get("interrupted"))
-    return RunResult(folder=Path("runs/1"), outcome=outcome, report=Path("runs/1/report.html"), was_interrupted=stopped)
-
-
 def handed_on(_draw: Random) -> Iterator[str]:
     """Run runs whose work is only noted: which scenario, where to, how fast, with what beside."""
     reported: list[str] = []
@@ -373,170 +302,6 @@ def handed_on(_draw: Random) -> Iterator[str]:
     for seeds, seed, port in ((None, None, None), ("0", None, "x"), (None, 1, None), (None, None, "x")):
         for about in (dodge, replace(dodge, seeds=(1, 2)), load_scenario("two-dodge")):
             yield said(run_verb.is_sweep(about, seeds=seeds, seed=seed, port=port))
-
-
-def tables(draw: Random) -> Iterator[str]:
-    """Print results of runs of all kinds."""
-    hits = [
-        {"what": f"'post {n}'", "t_s": n * 1.5, "x_m": 0.1 * n, "y_m": -0.2 * n, "part": "front" * (n % 2)}
-        for n in range(7)
-    ]
-    robot: dict[str, object] = {"distance_m": 1.0, "min_clearance_m": None, "trace_sha256": "abcdefghijk"}
-    cases: list[dict[str, object]] = [
-        {},
-        {"passed": False, "failures": ["no_collision: it hit 'post 0' at 0.000 s, x 0.00 m, y -0.00 m"], "hits": hits},
-        {"passed": False, "failures": ["interrupted (SIGINT)", "other"], "interrupted": True},
-        {"hits": hits[:1]},
-        {"hits": hits[:5], "notes": ["n1", "n2"], "explained": "because"},
-        {"goals_met": list("abcdefghi")},
-        {"goals_met": [], "goals_not_judged": list("abcdefg"), "last_blocks": ["a.c:1", "b.c:2"]},
-        {"coverage": {"lines_hit": 3, "lines": 4, "branch_ways_hit": 0, "branch_ways": 0}, "usart_lines": 1},
-        {"coverage": {"lines_hit": 3, "lines": 4, "branch_ways_hit": 1, "branch_ways": 6}, "usart_lines": 0},
-        {
-            "robots": {"one": robot, "two": robot | {"min_clearance_m": 0.5, "trace_sha256": None}},
-            "mode": "several robots",
-        },
-        dict.fromkeys(
-            (
-                "virtual_s",
-                "real_time_factor",
-                "distance_m",
-                "collisions",
-                "min_clearance_m",
-                "usart_baud",
-                "trace_sha256",
-            )
-        ),
-    ]
-    for case in cases:
-        yield said(case)
-        yield from printed(table.print_result, result_of(**case))
-        yield from printed(run_verb.end_with, result_of(**case), json_output=draw.random() < 0.5)
-
-
-def studies(draw: Random) -> Iterator[str]:
-    """Print fits, squares, effects, validations, walks of boards, and small failures."""
-    estimates = {
-        name: Estimate(name=name, value=0.0123456 * (n + 1), low=0.01 * n, high=0.02 * (n + 1))
-        for n, name in enumerate(fit.SHOWN)
-    }
-    ours = Fit(estimates=estimates, unseen={"track_mm": "it never turns"}, residual=0.001234, count=77)
-    found: dict[str, Fit | FileError] = {
-        "wheels": ours,
-        "ramps": replace(ours, estimates={}),
-        "sonar": FileError("none", hint="some"),
-        "other": FileError("nothing"),
-    }
-    yield from map(rounded, fit._lines(found))
-    yield said([fit._plain(one) for one in found.values()])
-    meta: tuple[dict[str, object], ...] = ({}, {"world": "room"}, {"world": {"name": "arena"}}, {"world": {}})
-    for where in meta:
-        yield fit._world_of(SimpleNamespace(meta=where))  # type: ignore[arg-type]  # as far as it is looked at
-    ways = [
-        Correction(e_d=1.01, e_b=0.98, e_max_m=0.0321, largest_m=0.04),
-        Correction(e_d=1.0, e_b=1.0, e_max_m=0.001, largest_m=0.0021),
-    ]
-    squares = SimpleNamespace(
-        squares=[SimpleNamespace(name=f"square {n}", is_clockwise=n == 1) for n in range(2)],
-        before=ways[0],
-        formulas=ways[1],
-        least_squares=ways[1],
-        errors=lambda _way: [(0.01, -0.02), (-0.3, 0.4)],
-        fit=ours,
-    )
-    yield from fit._umbmark_lines(squares)  # type: ignore[arg-type]  # as above
-    effects = [
-        ParameterEffect(
-            key="a.long.key.that.does.not.fit.into.its.column",
-            alone=(1.0, 3.0),
-            mu=1.0,
-            mu_star=2.0,
-            mu_star_conf=0.1,
-            sigma=0.5,
-            S1=0.1,
-            S1_conf=0.01,
-            ST=0.2,
-            ST_conf=0.02,
-        ),
-        ParameterEffect(key="b", alone=(), mu=None, mu_star=None, mu_star_conf=None, sigma=None),
-    ]
-    for samples in (0, 4):
-        design = SampleDesign(
-            ranges=(read_range("a=0..1"), read_range("b=2..5")), steps=2, trajectories=1, seed=0, samples=samples
-        )
-        yield from sensitivity._lines("mine", design, {"path_m": effects}, 12)
-    points: list[Any] = [((0, 1), 1), ((0, 1), 2), ((1, 1), 1), ((1, 1), 2)]
-    yield said(sensitivity._means(points, [{"m": 1.0}, {"m": 2.0}, {"m": 5.0}, {"m": 9.0}], ["m"]))
-
-    def figure(measured: float, bound: float) -> Figure:
-        tolerance = FigureTolerance(name="step", value=bound, formula="1 / 2")
-        return Figure(
-            group="g",
-            what=f"speed {measured}",
-            expected=1.0,
-            measured=measured,
-            uncertainty=0.01,
-            unit="m/s",
-            bound=tolerance,
-        )
-
-    missing = Missing(group="g", what="echo", why="none came")
-    variants = [Variant("direct", "", "kinematic"), Variant("adapter", "model", "bullet")]
-    lists_of: tuple[tuple[tuple[Figure | Missing, ...], ...], ...] = (
-        ((figure(1.0, 0.5),),),
-        ((figure(1.3, 0.4), figure(1.1, 1.0)), (missing,), ()),
-        ((figure(2.0, 0.0),),) * 25,
-        ((figure(1.499, 0.5),), (figure(1.4, 0.5),)),
-    )
-    for lists in lists_of:
-        results = [
-            TrialResult(experiment=f"e{n % 2}", variant=variants[n % 2], world="room", seed=n, findings=findings)
-            for n, findings in enumerate(lists)
-        ]
-        yield from printed(validate._print, results, Path("v"))
-        yield said(validate._plain(results))
-    with in_folder():
-        yield from printed(validate._write, Path("out"), results, ["a=1"])
-        yield said(sorted(path.name for path in Path("out").iterdir()))
-        with contextlib.suppress(KeyError), used_folder(None, "validation") as folder:
-            raise KeyError(said(folder))
-        yield said([folder, folder.exists()])
-    yield said(validate.experiments_named("s"))
-    for chosen, modes in (((), ()), ((), ("direct",)), ((), ("adapter",)), (("slip", "motors", "slip"), ())):
-        yield said([one.name for one in validate._chosen(chosen, modes)])
-    rows = [
-        VerdictRow(name=f"DD{n}", path="PB1 - 3", verdict=verdict, detail="why" * (n % 2), others=("DD9",))
-        for n, verdict in enumerate(BoardVerdict)
-    ]
-    for few in (rows, rows[:1], [row for row in rows if row.is_fault][:1]):
-        for as_json in (False, True):
-            yield from printed(board._print, few, as_json=as_json)
-    small = SimpleNamespace(
-        failure=SimpleNamespace(way="no_collision: front", says="it hit", at_ns=1_500_000_000),
-        things_before=9,
-        things_after=2,
-        trials=33,
-        is_complete=True,
-        trial=SimpleNamespace(trusted=()),
-    )
-    kept = SimpleNamespace(
-        scenario=Path("/k/s.toml"),
-        test=Path("/k/t.py"),
-        is_confirmed=True,
-        explained="why so",
-        outcome=SimpleNamespace(sha256="0123456789abcdefgh"),
-    )
-    for change in ({}, {"is_confirmed": False, "explained": ""}):
-        other = SimpleNamespace(**vars(kept) | change)
-        yield said(shrink.as_json(small, other))  # type: ignore[arg-type]  # as above
-        yield from printed(shrink._print, small, other)
-    small.is_complete, small.trial.trusted = False, ("x",)
-    yield from printed(shrink._print, small, kept)
-    for score, bounds, least in ((None, None, 5.0), (70.0, (60.0, 80.0), 75.0), (70.0, (60.0, 80.0), 65.0)):
-        tried_ = SimpleNamespace(score=score, bounds=bounds, pairs=range(20), possible=90)
-        yield mutate._below(tried_, least)  # type: ignore[arg-type]  # as above
-    yield said([mutate._drawn(range(30), count, seed) for count in (1, 7, 30) for seed in (0, 5)])  # type: ignore[arg-type]
-    yield said(draw.random())
 
 
 def projects(draw: Random) -> Iterator[str]:
@@ -619,17 +384,15 @@ def completions(_draw: Random) -> Iterator[str]:
         yield said(names.variable_names(context, "t"))
 
 
-TRACES = {
-    "options": options,
-    "refusals": refusals,
+TRACES = {  # what takes long comes last
     "handed_on": handed_on,
-    "tables": tables,
-    "studies": studies,
     "projects": projects,
     "completions": completions,
     "declared": declared_of(
         "robot_bench.cli", "robot_bench.cli.experiments", "robot_bench.cli.campaigns", "robot_bench.cli.project"
     ),
+    "options": options,
+    "refusals": refusals,
 }
 
 test_what_verbs_have_and_show_is_what_was_approved = judge_of(__file__, TRACES)

@@ -16,12 +16,30 @@ from bluepill_sim.fabric.bus_parts import CanFrame
 from bluepill_sim.fabric.can_network import CanEnd, CanError
 from bluepill_sim.peripherals.i2c import I2cStep, I2cSymbol
 from bluepill_sim.peripherals.spi import SpiWord
+from p2os.protocol.commands import pulse, vel
 from p2os.protocol.profiles import Profile
 from p2os.protocol.sip import SonarReading, StandardSip
 from p2os.robots.parameters import load_parameters
-from robot_bench.events import whole_lines
+from robot_bench.events import selection, whole_lines
 from robot_bench.events.codec import Blocks, EdgeBlock, Levels, event_of, events_of, line_of
-from robot_bench.events.kinds import KINDS, Contact, Event, PinEdge, Pose, Text, Verdict, Wave
+from robot_bench.events.kinds import (
+    KINDS,
+    CanTransfer,
+    Contact,
+    Event,
+    Fault,
+    I2cTransfer,
+    Note,
+    Packet,
+    PinEdge,
+    Pose,
+    Ranges,
+    SpiTransfer,
+    Text,
+    Verdict,
+    Wave,
+    WorldChange,
+)
 from robot_bench.events.stream import EventStream
 from robot_bench.events.words import distinguishing_words, is_frequent, last_words, words_of
 from robot_bench.recording.client_view import OdometryPose, SipRanges
@@ -267,6 +285,89 @@ def stream(draw: Random) -> Iterator[str]:
             reported.clear()
 
 
+#: Words that mean events, and words that mean none.
+MEANT = """\
+pin PB12 high|pin DD4 low|pin DD4 changes|pin DD5 changes|pin DD4|pin DD4 half|pin DD44 high|pin
+pin DD4 high now|usart1 sends go|usart1 matches ^x=-?\\d+$|usart1 matches (|usart1 sends|usart1 says go
+usart2 sends go|usb sends go|usart1|i2c1 writes 0x3c|i2c1 writes 60 aa|i2c1 reads 0x3c bb cc|i2c1 fails
+i2c1 fails 3|i2c1 writes|i2c1 writes 1023|i2c1 writes 1024|i2c1 writes -1|i2c1 reads 1 zz|i2c2 writes 0x3c
+i2c1|i2c1 asks 3|spi1 sends aa bb|spi1 gets bb|spi1 sends|spi1 takes aa|spi2 sends aa|can hears 0x123
+can sends 0x123 aa|can hears 536870911|can hears 536870912|can fails|can fails 1|can hears|can|contact
+contact post|contact 'post'|robot near 0.3 0.1 0.2|robot near 0.3 0.1 0|robot near 0 0|robot near a b 1
+robot near nan 0 1|robot within 0.1 0.1 0.4 0.2|robot within 0.4 0 0.1 1|robot within 0 1 1 0
+robot within 0.2 0.1 0.2 0.1|robot within 0 0 1|robot drives 0.3|robot drives 0|robot drives -1|robot drives
+robot moves|robot stops|robot stops now|robot flies|robot|time 0|time 0.3|time 0.30001|time -1|time 1e9
+time soon|time|sonar 1 below 0.4|sonar 2 below 0.5|sonar 3 below 0.5|sonar 0 below 1|sonar 1 above 0.4
+sonar 1 below 0|sonar x below 1|sonar 1 below|note adapter|note adapter driving|note adapter driving why
+note body|note|fault|fault sonar-stuck 3|fault link-down|thing post|thing card|thing|packet|packet SIP
+packet pulse|packet VEL|packet nothing|goal met|goal missed|goal open|goal||nonsense|contacts|uart1 sends x"""
+
+
+def meant_run(draw: Random) -> Iterator[Event]:
+    """Yield events whose places, values and times lie at the bounds of the words above, or beside them."""
+    t, bits = 0, draw.choice
+    sip = StandardSip(raw_x=1, raw_y=2, raw_heading=3, raw_left_velocity=4, raw_right_velocity=5)
+    frames = [pulse().to_frame().to_bytes(), vel(100).to_frame().to_bytes(), sip.to_frame(Profile.P2OS).to_bytes()]
+    yield PinEdge(t=0, wire="DD4", level=bits((True, False)))
+    for _ in range(220):
+        t += bits((0, 50, 50, 100)) * S // 1000
+        data, at = bits((b"\xaa", b"\xaa\xbb", b"\xbb\xcc", b"")), bits((0, 1000))
+        x, y = bits((0, 99_999, 100_000, 200_000, 300_000, 400_000, 400_001)), bits((0, 100_000, 200_000, 300_000))
+        yield bits((
+            PinEdge(t=t, wire=bits(("DD4", "DD5")), level=bits((True, False))),
+            Text(t=t, data=bits((b"go\n", b"g", b"o\n", b"x=3\r\n", b"x=-1", b" go go\n", b"\xff\n")), port=bits((
+                "usart1", "usart1", "usart2", "usb"))),
+            I2cTransfer(t=t, bus=bits(("i2c1", "i2c1", "i2c2")), begun=t - 1, address=bits((60, 60, 1023)), data=data,
+                        is_read=bits((True, False)), answered=bits((True, True, False)), acknowledged=bits((0, 1, 2)),
+                        end=bits(("stop", "stop", "lost", "cut", "restart"))),
+            SpiTransfer(t=t, bus=bits(("spi1", "spi1", "spi2")), begun=t - 1, ended=t, from_master=data + b"\xbb",
+                        from_slave=b"\xbb" * at + data),
+            CanTransfer(t=t, bus="can", begun=t - 1, identifier=bits((0x123, 0x123, 7, 536_870_911)), is_extended=False,
+                        is_remote=False, dlc=len(data), data=data, is_own=bits((True, False)),
+                        error=bits(("", "", "bit"))),
+            Contact(t=t, what=bits(("'post'", "wall", "post")), x_m=0.0, y_m=0.0),
+            *(Pose(t=t, x=x, y=y, z=0, heading=0, pitch=0, left=bits((0, 5000, 5001, -5001)), right=bits((0, 0, -9000)),
+                   left_angle=0, right_angle=0, collisions=0) for _ in range(3)),
+            Ranges(t=t, mm=bits(((399, 500), (400, 499), (401, 5000), (399,), ()))),
+            Note(t=t, who=bits(("adapter", "body")), what=bits(("driving", "lost")), detail=bits(("", "why"))),
+            WorldChange(t=t, op="move", name=bits(("post", "card")), fields={}),
+            Fault(t=t, op=bits(("inject", "clear", "died")), words=bits(("sonar-stuck 3 0.2", "link-down", "link"))),
+            Packet(t=t, direction=bits(("c2r", "c2r", "r2c")), data=bits((*frames, frames[0][:3], frames[0][3:]))),
+            Verdict(t=t, goal="g", met=bits((True, False)), says=""),
+        ))  # fmt: skip
+
+
+def meant(draw: Random) -> Iterator[str]:
+    """Pick events of runs by every kind of words, and go on from a saved state; refuse what means none."""
+    runs = [[*meant_run(draw)] for _ in range(6)]
+    own = {"PB12": "lamp", "DD4": "DD5"}
+    for words_ in "|".join(MEANT.splitlines()).split("|"):
+        try:
+            made, other = selection.select(words_), selection.select(words_)
+        except P2osError as error:
+            yield f"{words_}: {refusal(error)}"
+            continue
+        yield said([words_, [kind.__name__ for kind in made.kinds], made.wires, selection.bus_of(words_),
+                    tried(lambda w=words_: selection.select(w, own).wires)])  # fmt: skip
+        for run in runs:
+            made, places, cut = selection.select(words_), list[int](), draw.randrange(len(run))
+            for place, event in enumerate(run):
+                if place == cut:
+                    other.restore(made.snapshot())
+                # What is of another kind it passes over, but for the time, which it takes from any event.
+                if words_.startswith("time") and type(event) not in made.kinds:
+                    continue
+                is_taken = made.takes(event)
+                if place >= cut and other.takes(event) is not is_taken:
+                    places.append(-place)
+                places += [place] * is_taken
+            yield said(places)
+    lines_ = selection.Lines("usb")
+    for data, port in ((b"a", "usb"), (b"b", "usart1"), (b"c\r\n", "usb"), (b"\n", "usb")):
+        yield said(lines_.take(Text(t=0, data=data, port=port)))
+    yield said([tried(selection.wire_named, one, wires) for one in ("PB12", "DD4", "x") for wires in (None, own)])
+
+
 def transfers(draw: Random) -> Iterator[str]:  # noqa: C901 - three buses side by side
     """Put words, conditions and frames together, in slices of any length."""
     for _ in range(5):
@@ -437,6 +538,7 @@ TRACES: dict[str, Any] = {
     "words": words,
     "writer": writer,
     "stream": stream,
+    "meant": meant,
     "transfers": transfers,
     "views": views,
     "files": files,

@@ -8,11 +8,15 @@ from dataclasses import replace
 from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
+from types import SimpleNamespace
+from typing import Any
+from unittest import mock
 
 from adapter_sim.masters import Master
 from adapter_sim.pinout import load_pinout
 from p2os.robots.parameters import load_parameters
 from robot_bench import adapter, run
+from robot_bench.bench import board as board_module
 from robot_bench.bench.bench import Bench, run_of
 from robot_bench.bench.board import cut_wires, pins_of
 from robot_bench.bench.expectations import Expectations
@@ -31,6 +35,7 @@ from robot_bench.scenario.scenario import Scenario
 from simbase.errors import P2osError
 from simbase.timing import NS_PER_MS
 from tests.robot_bench.firmware.hurried import hurried
+from tests.tools.suite.acted import Acted, taken
 from tests.tools.suite.approved import Trace, judge_of, said, tried
 from tests.tools.suite.declared import declared_of
 
@@ -131,6 +136,25 @@ WHEN = """
 event = "contact"
 after_s = 0.1
 do = "end"
+"""
+
+
+WITH_FAULTS = """
+firmware = "motors.elf"
+world = "room"
+mode = "adapter"
+duration_s = 0.1
+[[fault]]
+at_s = 0.05
+fault = "link-down"
+[[when]]
+event = "contact"
+do = "inject"
+fault = "link-down"
+[[hand]]
+at_s = 0.05
+do = "inject"
+fault = "link-down"
 """
 
 
@@ -300,6 +324,49 @@ def folders(_draw: Random) -> Iterator[str]:
             os.chdir(before)
 
 
+def refusals(_draw: Random) -> Iterator[str]:
+    """Ask for what verbs refuse before, and by one condition at a time: of robots together, of chips of others."""
+    calls: list[str] = []
+    two, dodge = load_scenario("two-dodge").with_options(duration_s=0.05), load_scenario("dodge")
+    with TemporaryDirectory(prefix="p2os-test-") as name, mock.patch.object(run, "run_together", Acted(calls).together):
+        for named in ({}, {"variables": ["a"]}, {"drive": print}, {"coverage": True}, {"profile": True}):
+            yield f"{[*named]} {tried(run.run_scenario, two, Path('x'), **named)} {len(calls)}"  # type: ignore[arg-type]
+            calls.clear()
+        yield f"{tried(run.run_at_port, two, Path('x'), Acted(calls, 'port'))} {taken(calls)}"
+        yield tried(run.run_scenario, dodge, Path(name, "x"), variables=["gone"]).partition(" (known")[0]
+        yield tried(Bench.from_scenario, 3)
+        first = next(iter(Bench.together(two).values()))
+        yield tried(first.run_until, two.duration_ns, lambda _cycles: None)
+        yield tried(first._run_to, 9, lambda _cycles: None)
+        yield tried(first.fork, Path(name, "fork")).replace(name, "HERE")
+        first.run_until("0.02 s")
+        heard: list[int] = []
+        first.events.at_limit(heard.append)
+        first.on_slice = heard.append
+        first.checkpoint()
+        kept = first.snapshot()
+        first.run_until("0.03 s")
+        count = len(heard)
+        first.restart(kept)
+        first.run_until("0.04 s")
+        yield said([count > 0, len(heard) == count, first.now, first.on_slice is None, first._checkpoints])
+    with TemporaryDirectory(prefix="p2os-test-") as name:
+        (Path(name) / "mine.toml").write_text(WITH_FAULTS, encoding="utf-8")
+        mine = load_scenario(str(Path(name, "mine.toml")))
+        calm: dict[str, Any] = {"mode": "direct", "faults": (), "triggers": (), "hands": ()}
+        for kept_one in ("faults", "triggers", "hands"):
+            for where in (mine.where, ""):
+                changed = replace(mine, **calm | {kept_one: getattr(mine, kept_one), "mode": "direct", "where": where})
+                yield f"{kept_one} {tried(lambda c=changed: Bench(c).now)}".replace(name, "HERE")
+    chip: Any = SimpleNamespace(usart1=None)
+    board = Acted(calls, "recorder")
+    for measured in ({"coverage": False, "profile": False}, {"coverage": True, "profile": False}, {
+            "coverage": False, "profile": True}):  # fmt: skip
+        yield tried(lambda m=measured: type(run._measured(chip, fail_under=0.0, **m)).__name__)
+    yield said([tried(board_module.hear_buses, chip, board, buses) for buses in ((), ("spi1",))])
+    yield tried(board_module.plug_in, dodge, chip, board)
+
+
 def numbers(_draw: Random) -> Iterator[str]:
     """Give the adapter's firmware its numbers, for each robot; and round what is reported of things."""
     with TemporaryDirectory(prefix="p2os-test-") as name:
@@ -324,7 +391,8 @@ def numbers(_draw: Random) -> Iterator[str]:
 
 
 TRACES: dict[str, Trace] = {
-    "runs": runs, "together": together, "expectations": expectations, "folders": folders, "numbers": numbers,
     "declared": declared_of("robot_bench", "robot_bench.bench", "robot_bench.running"),
+    "refusals": refusals, "numbers": numbers, "together": together, "expectations": expectations, "runs": runs,
+    "folders": folders,
 }  # fmt: skip
 test_what_short_runs_are_is_what_was_approved = judge_of(__file__, TRACES)

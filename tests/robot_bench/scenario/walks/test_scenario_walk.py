@@ -795,8 +795,8 @@ def triggers(draw: Random) -> Iterator[str]:
 
 
 TRACES = {
-    "settings": settings, "lines": lines, "included": included, "many": many, "options": options, "hands": hands,
-    "scripts": scripts, "triggers": triggers,
     "declared": declared_of("robot_bench.scenario", "robot_bench.scenario.hands"),
+    "scripts": scripts, "triggers": triggers, "hands": hands, "many": many, "lines": lines, "options": options,
+    "included": included, "settings": settings,
 }  # fmt: skip
 test_what_scenarios_say_is_what_was_approved = judge_of(__file__, TRACES)

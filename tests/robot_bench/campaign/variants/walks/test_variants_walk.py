@@ -308,7 +308,7 @@ def mutation(draw: Random) -> Iterator[str]:
 
 
 TRACES: dict[str, Trace] = {
-    "lists": lists, "shrinking": shrinking, "outcomes": outcomes, "versions": versions, "mutation": mutation,
+    "lists": lists, "versions": versions, "mutation": mutation, "shrinking": shrinking, "outcomes": outcomes,
     "declared": declared_of(*(f"robot_bench.campaign.{one}" for one in (
         "variants", "variants.mutation", "variants.shrinking"))),
 }  # fmt: skip

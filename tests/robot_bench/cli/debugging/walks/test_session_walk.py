@@ -214,9 +214,9 @@ def words(_draw: Random) -> Iterator[str]:
 
 
 TRACES: dict[str, Trace] = {
-    "page": page,
-    "gdb": gdb,
     "words": words,
     "declared": declared_of("robot_bench.cli.debugging"),
+    "gdb": gdb,
+    "page": page,
 }
 test_how_a_run_stands_is_what_was_approved = judge_of(__file__, TRACES)

@@ -45,6 +45,14 @@ FAULTS = ("wheel-blocked left", "sonar-stuck 4 0.2", "sonar-dead 5", "link-down"
           "sonar-noisy 3 0.1", "stop-button")  # fmt: skip
 
 
+def time_of(draw: Random, until_s: float, least: float = 0.2) -> int:
+    """Return a time of a run in ns: mostly one that other things have too, the run's parts and whole half seconds."""
+    kind = draw.randrange(4)
+    if kind < 2:
+        return round(draw.randint(1, 8) / 8 * until_s * S)
+    return draw.randint(1, round(2 * until_s)) * S // 2 if kind == 2 else round(draw.uniform(least, 0.99) * until_s * S)
+
+
 def legs_of(draw: Random, until_s: float, ways: Sequence[Codes] = ALL_CODES) -> list[tuple[float, Codes]]:
     """Return which codes the motors have from when on."""
     found, at = [(0.0, draw.choice(ways))], 0.0
@@ -65,7 +73,7 @@ def rises(draw: Random, until_s: float) -> dict[str, float | tuple[float, ...]]:
 def answered(draw: Random) -> Mapping[str, SensorResponse]:
     """Return what a program does of each sensor: turns away, exchanged, one-sided, or hardly at all."""
     away = {2: (3, 2), 3: (3, 1), 4: (2, -2), 5: (-2, 2), 6: (1, 3), 7: (2, 3)}
-    kind = draw.randrange(6)
+    kind = draw.randrange(8)
     codes: dict[int, Codes] = dict(away)
     if kind == 1:
         codes = {place: (two, one) for place, (one, two) in away.items()}
@@ -76,6 +84,11 @@ def answered(draw: Random) -> Mapping[str, SensorResponse]:
         codes = {}
     elif kind == 4:
         codes = {place: (max(one, 1), two) for place, (one, two) in away.items()}
+    elif kind == 5:
+        codes = {place: draw.choice(ALL_CODES) for place in draw.sample(sorted(away), draw.randint(1, 6))}
+    elif kind == 6:
+        one, other = draw.choice(((2, 7), (3, 6), (4, 5), (2, 3), (6, 7)))
+        codes[one] = codes[other] = draw.choice((codes[one], codes[other], AHEAD))
     return answers(
         codes, base=draw.choice((AHEAD, AHEAD, SPIN)), other=draw.choice(((2, 2), (2, 2), AHEAD, SPIN)),
         answered=draw.choice((2, 2, 200 * MS, S, None)), otherwise_ns=draw.choice((S, S, 4 * MS, 0)),
@@ -83,9 +96,22 @@ def answered(draw: Random) -> Mapping[str, SensorResponse]:
     )  # fmt: skip
 
 
+def nearly_exchanged(draw: Random) -> Mapping[str, SensorResponse]:
+    """Return what a program does of two sensors, or sides, exchanged; it may fail to do it of one of them."""
+    away = {2: (3, 2), 3: (3, 1), 4: (2, -2), 5: (-2, 2), 6: (1, 3), 7: (2, 3)}
+    one, other = draw.choice(((3, 6), (4, 5), (3, 5), (2, 3)))
+    codes = {place: pair[::-1] for place, pair in away.items()} if draw.random() < 0.5 else dict(away)
+    codes[one], codes[other] = codes[other], codes[one]
+    found = dict(answers(codes))
+    if draw.random() < 0.5:
+        net = draw.choice(DISTANCES)
+        found[net] = replace(found[net], **draw.choice(({"answered": None}, {"codes": AHEAD}, {"codes": (3, 2)})))
+    return found
+
+
 def rows_of(draw: Random, until_s: float) -> dict[str, object]:
     """Return what else the trace has: faults, notes, changes, waves."""
-    at = lambda: round(draw.uniform(0.2, 0.98) * until_s * S)  # noqa: E731 - some time
+    at = lambda: time_of(draw, until_s)  # noqa: E731 - some time
     faults = [Fault(t=at(), op=draw.choice(("inject", "inject", "clear", "died")), words=draw.choice(FAULTS))
               for _ in range(draw.choice((0, 1, 3)))]  # fmt: skip
     whats = ("driving", "command", "lost", "motors", "reset")
@@ -100,7 +126,7 @@ def rows_of(draw: Random, until_s: float) -> dict[str, object]:
 def control_pins(draw: Random, record: RunRecord, until_s: float) -> None:
     for net, level in (("rst", 0), ("p2dx_con", 1)):
         if draw.random() < 0.3:
-            at = round(draw.uniform(0.3, 0.95) * until_s * S)
+            at = time_of(draw, until_s)
             edges = [(0, level), (at, 1 - level), (at + round(draw.choice((0.5, 9.0)) * S), level)]
             record.pins[net] = Edges(edges)
 
@@ -124,9 +150,10 @@ def drawn_effect(draw: Random, record: RunRecord, hit: int) -> InputEffect:
 def program(draw: Random, record: RunRecord, hit: int | None) -> AskedProber:
     """Return a program that does what is drawn."""
     end = record.last_ns
+    until_s = end / S
     replay = AskedReplay(
-        record, end + draw.choice((0, 4 * S)), round(end * draw.choice((1.0, 1.0, 0.4))),
-        resets=[ChipReset(round(draw.uniform(0.2, 0.99) * end), draw.choice(("IWDG", "IWDG", "PIN", "SOFTWARE", "ODD")),
+        record, end + draw.choice((0, 4 * S)), draw.choice((end, end, time_of(draw, until_s))),
+        resets=[ChipReset(time_of(draw, until_s), draw.choice(("IWDG", "IWDG", "PIN", "SOFTWARE", "ODD")),
                           draw.choice(PLACES)) for _ in range(draw.choice((0, 0, 0, 1, 5)))],
         writes=draw.choice((*PLACES, None)), fed=[(round(0.1 * n * end), draw.choice(PLACES)) for n in range(9)],
         edges=draw.choice(([], [], [(end // 2, "motor1_comm1", True)])),
@@ -137,7 +164,7 @@ def program(draw: Random, record: RunRecord, hit: int | None) -> AskedProber:
     replay.resets = sorted(replay.resets, key=lambda one: one.at)
     lines = [(0.0, 0.6 * end / S, {"a.c:1": 3, "a.c:2": 9, "a.c:9": 1}),
              (0.6 * end / S, 1e3, draw.choice(({}, {"a.c:2": 5}, {f"a.c:{n}": n for n in range(2, 8)})))]  # fmt: skip
-    asked = answered(draw)
+    asked = answered(draw) if draw.random() < 0.6 else nearly_exchanged(draw)
     kinds = draw.choice(((asked,) * 3, (asked, answered(draw), asked), (asked,)))
     ends = () if hit is None else (hit, min(hit + 3 * S, replay.end))
     effects = {until: drawn_effect(draw, record, hit or 0) for until in ends}
@@ -156,9 +183,10 @@ def asked_of(prober: AskedProber | None) -> str:
 
 def contacts(draw: Random) -> Iterator[str]:
     """Look for why things were touched: ahead, beside, behind, seen or not, by programs of many kinds."""
-    for number in range(110):
+    for number in range(220):
         legs = legs_of(draw, 6.0, (AHEAD, AHEAD, AHEAD, (2, 2), SPIN, BACK))
-        record = driven_run(*legs, until_s=6.0, on=rises(draw, 6.0), **rows_of(draw, 6.0))
+        on = rises(draw, 6.0) if draw.random() < 0.5 else dict.fromkeys(draw.sample(DISTANCES[2:6], 2), 4.5)
+        record = driven_run(*legs, until_s=6.0, on=on, **rows_of(draw, 6.0))
         if draw.random() < 0.1:
             record = replace(record, poses=poses(*legs, until_s=6.0, driven=False))
         control_pins(draw, record, 6.0)
@@ -179,7 +207,7 @@ def contacts(draw: Random) -> Iterator[str]:
 
 def stays(draw: Random) -> Iterator[str]:
     """Look for why robots came no further: reset, let go, stuck, spinning, blind, or as they were meant to."""
-    for number in range(100):
+    for number in range(130):
         until_s = draw.choice((16.0, 24.0))
         ways = draw.choice((ALL_CODES, (AHEAD, STILL), (STILL, SPIN), (SPIN,)))
         legs = [(0.0, STILL), *((max(at, 0.5), codes) for at, codes in legs_of(draw, until_s, ways))]
@@ -243,14 +271,14 @@ def parts_of_findings(draw: Random) -> Iterator[str]:
         control_pins(draw, record, until_s)
         if draw.random() < 0.2:
             record = replace(record, poses=poses((0.0, STILL), until_s=until_s))
-        at = round(draw.uniform(0.3, 1.0) * until_s * S)
+        at = time_of(draw, until_s, 0.3)
         steps: list[ChainLink] = []
         found = findings.obeyed(record, draw.choice((0.0625, 0.2)), at, steps)
         way = findings.codes_between(record, at // 2, at)
         yield f"{at} {found} {' '.join(step_lines(steps))} {findings.steady_since(record, at)} {way}"
         faults = [findings.injected(record, at, on, sonar) for on, sonar in (("wheels", 0), ("sonar", 4))]
         yield said([findings.held_codes(way, at), findings.let_go(record, at), faults])
-        reads = sorted(round(draw.uniform(0.0, 12.0) * S) for _ in range(draw.choice((0, 9, 200))))
+        reads = sorted(time_of(draw, 12.0, 0.0) for _ in range(draw.choice((0, 9, 200))))
         replay = AskedReplay(
             record, 12 * S, 12 * S, variables=[("a", 0, 1), ("b", 0, 2), ("c", 1, 4), ("d", 2, 8)],
             reads_at={"a.c:1": reads},
@@ -278,16 +306,18 @@ def exchanges(draw: Random) -> Iterator[str]:
     def side(net: str) -> str:
         return "left" if int(net[2:]) < 5 else "right"
 
-    for _ in range(120):
+    for _ in range(500):
         rows = [answered(draw)] * draw.choice((1, 3, 4))
         if draw.random() < 0.3:
             rows[-1] = answered(draw)
+        elif draw.random() < 0.6:
+            rows = [*[nearly_exchanged(draw)] * draw.choice((1, 3)), nearly_exchanged(draw)]
         yield f"{[one.codes for one in rows[0].values()]} {exchanged(DISTANCES, rows, side)}"
 
 
 def scenes(draw: Random) -> Iterator[str]:
     """Look from robots on their way at points: within cones, near their edges, and out of sight."""
-    for _ in range(30):
+    for _ in range(60):
         places = [[round(draw.uniform(-0.2, 0.2), 3), round(draw.uniform(-0.2, 0.2), 3), heading]
                   for heading in (1.57, 0.4, -0.2, -1.57)]  # fmt: skip
         robot = {"sonar": places, "sonar_cone_rad": draw.choice((0.3, 0.52, 1.0))}
@@ -301,6 +331,8 @@ def scenes(draw: Random) -> Iterator[str]:
         at = draw.choice((0, S, 2 * S + 1, 9 * S))
         hit = Contact(t=at, what="'a'", x_m=draw.uniform(0, 1), y_m=draw.uniform(-0.5, 0.6))
         since = draw.choice((0, S // 2, S))
+        record.changes += [WorldChange(t=t, op="move", name=name, fields={}) for t, name in (
+            (since, "a"), (at, draw.choice(("a", "b"))), (at + 1, "a"))]  # fmt: skip
         sides = [one.side for one in scene.sensors]
         yield said([scene.sensors, sides, scene.cone_rad, scene.threshold_m, scene.step_mps, scene.gives_up_ns])
         yield said([scene.pose(hit.t).t, [one.t for one in scene.poses(since, hit.t)][:3], scene.bearing_rad(hit)])

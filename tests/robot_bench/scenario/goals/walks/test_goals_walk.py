@@ -1,6 +1,7 @@
 """Each kind of goal on small runs whose times, places and values lie on a grid, as its bounds do: at, below, above.
 
-Each run is judged as it comes and, from a state that was saved on the way, by another judge: both have to say the same.
+Each run is judged as it comes and, from a state that was saved on the way, by another judge that gets events of every
+kind: both have to say the same.
 """
 
 import math
@@ -8,14 +9,27 @@ from collections.abc import Iterator, Mapping
 from random import Random
 from typing import Any
 
-from robot_bench.events.kinds import Clearance, Contact, Event, Note, PinEdge, Pose, Ranges, Text, Wave, WorldChange
+from robot_bench.events.kinds import (
+    Clearance,
+    Contact,
+    Event,
+    Note,
+    PinEdge,
+    Pose,
+    Ranges,
+    Text,
+    Verdict,
+    Wave,
+    WorldChange,
+)
+from robot_bench.events.stream import EventStream
 from robot_bench.scenario.goals.judging import Goal, GoalJudge, RunEnd, judge, load_goal
 from robot_bench.scenario.goals.kinds import every_kind
 from robot_bench.scenario.goals.watch import given_in_words, window_in_words
 from simbase.errors import P2osError
 from tests.robot_bench.recording.records import S
 from tests.robot_bench.scenario.goals.test_goals_on_long_runs import GOALS
-from tests.tools.suite.approved import Trace, judge_of, refusal, said
+from tests.tools.suite.approved import Trace, judge_of, refusal, said, tried
 from tests.tools.suite.declared import declared_of
 
 MS = S // 1000
@@ -31,6 +45,7 @@ LINES = ("ready", "go left=1 right=2", "go left=-2 right=2", "stop", "x=0.1 m", 
 STEERING = frozenset({"turns_away", "turns_long", "steers_away", "no_idle_turn", "backs_on_path", "turn_ends", "lasts",
                       "has_reason", "answers"})  # fmt: skip
 WIRES = ("DD4", "DD5", "rst", *(f"motor{motor}_comm{bit}" for motor in (1, 2) for bit in (1, 2, 3)))
+EVERY_KIND = (Clearance, Contact, Note, PinEdge, Pose, Ranges, Text, Wave, WorldChange)
 NEAR = (200, 499, 500, 501, 600, 700, 900, 5000)
 
 
@@ -39,7 +54,9 @@ def numbers(draw: Random, key: str, value: Any) -> Any:  # noqa: PLR0911 - by th
     if isinstance(value, list):
         if key == "area_m":
             low = [draw.choice((-0.3, 0.0, 0.1)) for _ in range(2)]
-            return [*low, *(one + draw.choice((0.2, 0.5, 3.0)) for one in low)]
+            if draw.random() < 0.15:
+                return draw.choice(([*low, 1.0], [*low, 1.0, 1.0, 1.0], [*low, True, 1.0], [*low, "1", 1.0]))
+            return [*low, *(one + draw.choice((0.2, 0.5, 3.0, 3.0, 0.0, -0.1)) for one in low)]
         return value if draw.random() < 0.8 else value[::-1]
     if isinstance(value, bool | str) or draw.random() < 0.2:
         return value
@@ -132,6 +149,7 @@ def small_run(draw: Random) -> Iterator[Event]:  # noqa: C901, PLR0912 - one kin
 def judged(goal: Goal, run: list[Event], draw: Random) -> Iterator[str]:
     """Say when a goal is decided, and what becomes of it, by a judge and by one that goes on from a saved state."""
     first, second = GoalJudge([goal]), GoalJudge([goal])
+    second._watches[0].kinds = EVERY_KIND  # what a watch did not ask for it passes over
     cut, saved, end = draw.randrange(len(run)), draw.randrange(len(run)), run[-1].t + draw.choice((0, 50, 500)) * MS
     reported = ""
     for place, event in enumerate(run):
@@ -174,6 +192,35 @@ def kinds(draw: Random) -> Iterator[str]:
             yield from judged(goal, draw.choice(runs), draw)
 
 
+def published(draw: Random, goals: list[Goal], run: list[Event]) -> Iterator[str]:
+    """Judge a run by its stream: what is published when, which verdict ends it, and by a judge that comes later."""
+    stream, found = EventStream(), GoalJudge(goals, can_tell_world=draw.random() < 0.7)
+    seen, ended = list[Verdict](), list[int]()
+    found.subscribe(stream)
+    stream.subscribe(seen.append, Verdict)
+    found.on_end = lambda: ended.append(stream.released_until)
+    last = run[-1].t + draw.choice((0, 500)) * MS
+    end = RunEnd(last, draw.choice((0, last, last + S)), by_scenario=draw.random() < 0.3)
+    for place, limit in enumerate((last // 3, last // 2, last)):
+        for event in run:
+            if stream.released_until < event.t <= limit:
+                stream.publish(event)
+        if place == 1:
+            found.end_at(end)
+        stream.release(limit)
+        yield said([limit, seen, ended, found.has_ended_run, found.missed])
+        seen.clear()
+    others = goals[1:] if draw.random() < 0.5 else goals
+    later = GoalJudge(others)
+    later.restore(GoalJudge(goals).snapshot())
+    yield said([later.is_behind, len(found.goals), found.margins(last), found.finish(end)])
+    later.subscribe(stream)
+    later.catch_up(run, last)
+    yield said([later.is_behind, later.has_ended_run, later.finish(end), stream.pending()])
+    for wrong in (None, 3, {"goals": ()}):
+        yield tried(later.restore, wrong)
+
+
 def together(draw: Random) -> Iterator[str]:
     """Judge runs by several goals at once, excused ones among them, as reports do."""
     for _ in range(12):
@@ -187,6 +234,7 @@ def together(draw: Random) -> Iterator[str]:
             except P2osError as error:
                 yield refusal(error)
         run = [*small_run(draw)]
+        yield from published(draw, goals, run)
         for planned in (0, run[-1].t + S):
             for can_tell in (True, False):
                 yield said(judge(run, goals, end_ns=run[-1].t, planned_ns=planned, can_tell_world=can_tell))
