@@ -98,12 +98,12 @@ def test_without_a_bench(): assert 1 == 2
 
 @pytest.mark.slow
 def test_a_failure_says_what_was_wanted_what_happened_last_and_where_to_look(pytester: pytest.Pytester) -> None:
-    result = run(pytester, FAILED, "--junitxml", "junit.xml", "--bench-body", "best")
+    result = run(pytester, FAILED, "--junitxml", "junit.xml", "--bench-body", "best", "--bench-mode", "adapter")
     result.assert_outcomes(failed=4, errors=3)
     result.stdout.fnmatch_lines([
         "E *ExpectationError: 'usart1 sends take-off' did not happen, from 0.700 s to 1.000 s",
         "*last events:*", "*fault inject: link-down*",
-        f"*replay:   pytest 'test_mine.py::test_it_flies' --bench-body {resolve_body(BEST)}",
+        f"*replay:   pytest 'test_mine.py::test_it_flies' --bench-mode adapter --bench-body {resolve_body(BEST)}",
     ])  # fmt: skip
     out = result.stdout.str()
     assert "there is no scenario 'motorz' (hint: did you mean 'motors'?)" in out
