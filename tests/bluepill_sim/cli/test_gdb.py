@@ -149,20 +149,20 @@ class Shared:
     read_only = ""
 
     def __init__(self) -> None:
-        self.told: list[str] = []
+        self.notified: list[str] = []
 
     def attached(self) -> None:
-        self.told.append("attached")
+        self.notified.append("attached")
 
     def interrupted(self) -> None:
-        self.told.append("interrupted")
+        self.notified.append("interrupted")
 
     def left(self, *, was_killed: bool, is_lost: bool) -> None:
-        self.told.append(f"killed {was_killed}, lost {is_lost}")
+        self.notified.append(f"killed {was_killed}, lost {is_lost}")
 
 
 @pytest.mark.parametrize(
-    ("sent", "told"),
+    ("sent", "notified"),
     [
         (b"\x03", ["attached", "interrupted"]),
         (b"\x03" + frame(b"?"), ["attached"]),  # it came too late for what it was meant for
@@ -172,8 +172,8 @@ class Shared:
         (b"", ["attached", "killed False, lost True"]),
     ],
 )  # fmt: skip
-def test_a_shared_machine_is_told_what_each_debugger_does_and_the_next_one_may_come(
-    sent: bytes, told: list[str]
+def test_a_shared_machine_is_notified_of_each_debugger_and_the_next_one_may_come(
+    sent: bytes, notified: list[str]
 ) -> None:
     port, target = GdbPort(0), Shared()
     try:
@@ -187,13 +187,13 @@ def test_a_shared_machine_is_told_what_each_debugger_does_and_the_next_one_may_c
                 else:
                     line.shutdown(socket.SHUT_WR)
                 port.serve(target, LIMIT_S)
-                if "killed" in told[-1]:
+                if "killed" in notified[-1]:
                     while line.recv(64):
                         pass  # the answer, and the end: its line is closed at once
-            if "killed" not in told[-1]:
+            if "killed" not in notified[-1]:
                 port.serve(target, LIMIT_S)
-                assert target.told.pop() == "killed False, lost True"
-            assert target.told == told * count
+                assert target.notified.pop() == "killed False, lost True"
+            assert target.notified == notified * count
     finally:
         port.close()
 

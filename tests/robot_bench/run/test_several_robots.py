@@ -184,14 +184,14 @@ def test_a_run_passed_where_each_of_its_robots_has(met: str, asked: bool, tmp_pa
     """Whoever keeps failures alone keeps a run in which one robot fails."""
     kinds = {True: 'kind = "no_collision"', False: 'kind = "min_distance"\ndistance_m = 9'}
     goals = [f'[[goal]]\nrobot = "{name}"\n{kinds[name in met]}\n' for name in "ab"]
-    several, told = two(tmp_path, "direct", more="".join(goals), duration=0.02), list[bool]()
+    several, reported = two(tmp_path, "direct", more="".join(goals), duration=0.02), list[bool]()
 
     def is_kept(passed: bool) -> bool:
-        told.append(passed)
+        reported.append(passed)
         return not passed
 
     result = run_together(several, tmp_path / "run", is_kept=is_kept, files=Files.SUMMARY)
-    assert (told, result.passed) == ([asked], asked)
+    assert (reported, result.passed) == ([asked], asked)
     assert [(tmp_path / "run" / name / TRACE_NAME).exists() for name in "ab"] == [not asked] * 2
 
 

@@ -34,7 +34,7 @@ class Member:
     end: Nanos = 10**12
     loop: RunLoop = field(default_factory=lambda: RunLoop(Leader(), ()))
     rims: tuple[float, float] | None = None
-    #: How many steps of its ramp it has asked for, and been told of.
+    #: How many steps of its ramp it has asked for, and been notified of.
     asked: int = 0
     taken: list[Wheels] = field(default_factory=list)
 
