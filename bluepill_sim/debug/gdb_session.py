@@ -67,7 +67,8 @@ class GdbSession:
         self._target = target
         self._monitor = Monitor(target)
         self._stop = HaltReason(StopKind.STEP)
-        self._flash: dict[int, bytes] = {}
+        #: What is to be programmed, in the order in which it came: an address, and bytes so many times over.
+        self._flash: list[tuple[int, bytes, int]] = []
         self._by_letter: dict[bytes, Callable[[bytes], bytes | None]] = {
             b"?": lambda _: self._stop_reply(self._stop),
             b"g": lambda _: _hex(self._inspector.read_registers()),
@@ -250,23 +251,21 @@ class GdbSession:
 
     def _write_flash(self, rest: bytes) -> bytes:
         where, _, data = rest.partition(b":")
-        self._flash[_number(where)] = data
+        self._flash.append((_number(where), data, 1))
         return _OK
 
     def _erase_flash(self, address: int, size: int) -> bytes:
         begin = without_alias(address) - FLASH_BASE
         if begin % FLASH_PAGE_BYTES or not 0 <= begin <= FLASH_BYTES_FITTED - size:
             return _NO_MEMORY
-        self._flash[address] = b"\xff" * size
+        self._flash.append((address, b"\xff", size))
         return _OK
 
     def _program_flash(self) -> bytes:
-        rows, self._flash = list(self._flash.items()), {}
-        for address, data in rows:
-            if data and not self._inspector.write_memory(address, data):
-                return _NO_MEMORY
+        rows, self._flash = self._flash, []
+        is_done = all(self._inspector.write_memory(at, data * times) for at, data, times in rows if data and times)
         self._target.changed()
-        return _OK
+        return _OK if is_done else _NO_MEMORY
 
 
 #: Answers that never change; there is one thread.

@@ -10,7 +10,7 @@ Invariant: what a part is told is in the order of the bus, each call with the ti
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -118,6 +118,8 @@ class I2cCall:
     #: How many of its addresses and bytes were acknowledged, and what it has read.
     acknowledged: int = 0
     read: bytes = b""
+    #: Its clock.
+    hz: int = 100_000
 
     def steps(self) -> Iterator[int]:
         """Return what it does, up to the STOP."""
@@ -233,7 +235,7 @@ class I2c(Peripheral):
         """
         if not 0 <= address < 1 << 10 or hz <= 0:
             raise ValueError(f"{self.name}: a call of {address:#x} at {hz} Hz: 0 to 0x3FF, and more than 0 Hz")
-        self._calls += (I2cCall(address, written, read_bytes),)
+        self._calls += (I2cCall(address, written, read_bytes, hz=hz),)
         if len(self._calls) == 1:
             self.native.far_hz = hz
             self.command(I2cCommand.CALL)
@@ -333,6 +335,8 @@ class I2c(Peripheral):
         if self._is_stopping:
             self.answered += (call,)
             self._calls, self._step, self._is_stopping = self._calls[1:], 0, False
+            if self._calls:
+                self.native.far_hz = self._calls[0].hz
             return self._next_step(0)
         if self._step:
             call = self._noted(call, steps[self._step - 1], answer)
@@ -345,13 +349,12 @@ class I2c(Peripheral):
 
     def _noted(self, call: I2cCall, step: int, answer: int) -> I2cCall:
         """Return a call with what became of a step; one that is refused is the last."""
-        kept = call.address, call.written, call.read_bytes
         if step & ~0x1FF == _FAR_READ:
-            return I2cCall(*kept, call.acknowledged, call.read + bytes([answer & 0xFF]))
+            return replace(call, read=call.read + bytes([answer & 0xFF]))
         if not answer & _HELD:
             self._step = len(tuple(call.steps()))
             return call
-        return I2cCall(*kept, call.acknowledged + 1, call.read)
+        return replace(call, acknowledged=call.acknowledged + 1)
 
     def _write_ccr(self, _written: int, _previous: int) -> None:
         if self.words[CR1] & 1:

@@ -20,6 +20,7 @@ on the worker that it runs in.
 import contextlib
 import itertools
 import re
+import shlex
 from collections.abc import Generator, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -335,10 +336,10 @@ def _record(item: pytest.Item, used: "Bench", report: Any, failure: str) -> None
         report.sections.append(("bench: no report", str(error)))
         return
     item.user_properties.append(("bench_report", str(page)))
-    firmware = item.config.getoption("--firmware")
-    options = f" --firmware {firmware}" if firmware else ""
+    given = {name: item.config.getoption(name) for name in ("--firmware", "--bench-mode", "--bench-body")}
     if used.scenario.body == BEST:  # elsewhere it may be another one
-        options += f" --bench-body {resolve_body(BEST)}"
+        given["--bench-body"] = resolve_body(BEST)
+    options = "".join(f" {name} {shlex.quote(str(value))}" for name, value in given.items() if value)
     picture = folder / "path.png"
     if why:
         report.sections.append(("bench: why", why))

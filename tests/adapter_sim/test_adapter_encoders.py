@@ -191,6 +191,33 @@ def test_a_snapshot_holds_all_of_it() -> None:
     assert other.snapshot() == encoders.snapshot()
 
 
+PACKETS = st.lists(st.tuples(st.integers(-200, 200), st.integers(-200, 200), st.integers(-400, 400)), min_size=1)
+
+
+@given(before=PACKETS, after=PACKETS, asked=st.booleans())
+@settings(max_examples=40)
+def test_a_snapshot_is_put_back_whatever_has_been_taken_and_asked_since(
+    before: list[tuple[int, int, int]], after: list[tuple[int, int, int]], asked: bool
+) -> None:
+    encoders = fresh()
+
+    def known() -> object:
+        return encoders.counts, encoders.travel_nm, encoders.jumps, encoders.snapshot()
+
+    for packet in before:
+        encoders.take(*packet)
+    saved, then = encoders.snapshot(), known() if asked else None
+    for packet in after:
+        encoders.take(*packet)
+        known()
+    encoders.begin((10**9, 2 * 10**9))
+    known()
+    encoders.restore(saved)
+    now = known()
+    encoders._restored()  # works out anew whatever was kept
+    assert now == known() == (then or now)
+
+
 def test_codes_walk_one_at_a_time_and_dwell() -> None:
     walk, shown = CodeWalk(20), []
     for now in range(100):

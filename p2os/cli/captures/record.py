@@ -91,8 +91,8 @@ def record_session(
             closing = b"".join(connection.take_output())
             with contextlib.suppress(TransportError):
                 transport.write(closing)
-            if closing:
-                on_chunk(Chunk(at_ns=clock() - start, direction=Direction.TO_ROBOT, data=closing))
+                if closing:
+                    on_chunk(Chunk(at_ns=clock() - start, direction=Direction.TO_ROBOT, data=closing))
     return sips
 
 

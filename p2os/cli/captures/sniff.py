@@ -269,16 +269,19 @@ class TapBridge:
         if self._client is None:
             return
         client, robot, self._client, self._robot = self._client, self._robot, None, None
-        closing = self._tap.closing_frames()
+        closing, is_sent = self._tap.closing_frames(), False
         if robot is not None:
             with contextlib.suppress(TransportError):
                 robot.write(closing)
+                is_sent = True
             robot.close()
         client.close()
         self.sessions += 1
-        if closing:
+        if closing and is_sent:
             self._on_chunk(self._tap.observe(Direction.TO_ROBOT, closing, self.now))
             self._on_event("the session was open: sent STOP, VEL 0 and CLOSE")
+        elif closing:
+            self._on_event("the session was open, and no STOP can be sent: the robot's watchdog stops it")
         self._on_event(f"client gone: {reason}")
 
     def _wait(self) -> None:

@@ -11,7 +11,7 @@ import pytest
 
 from bluepill_sim.__main__ import run
 from bluepill_sim.board import BluePill
-from bluepill_sim.cli.gdb_server import GdbServer
+from bluepill_sim.cli.gdb_server import GdbPort, GdbServer
 from bluepill_sim.debug.machine import LoneChip
 from bluepill_sim.debug.packets import frame
 from bluepill_sim.errors import BluePillError
@@ -141,3 +141,79 @@ def test_the_command_serves_once(capfd: pytest.CaptureFixture[str], monkeypatch:
     assert run(["debug", DODGE, "--port", "0", "--once"]) == 0
     assert done == [b"T05thread:1;"]
     assert "waiting for GDB on port" in capfd.readouterr().err
+
+
+class Shared:
+    """A machine that another one runs, as far as a port needs it."""
+
+    read_only = ""
+
+    def __init__(self) -> None:
+        self.notified: list[str] = []
+
+    def attached(self) -> None:
+        self.notified.append("attached")
+
+    def interrupted(self) -> None:
+        self.notified.append("interrupted")
+
+    def left(self, *, was_killed: bool, is_lost: bool) -> None:
+        self.notified.append(f"killed {was_killed}, lost {is_lost}")
+
+
+@pytest.mark.parametrize(
+    ("sent", "notified"),
+    [
+        (b"\x03", ["attached", "interrupted"]),
+        (b"\x03" + frame(b"?"), ["attached"]),  # it came too late for what it was meant for
+        (frame(b"?") + b"\x03", ["attached", "interrupted"]),
+        (frame(b"D"), ["attached", "killed False, lost False"]),
+        (frame(b"k"), ["attached", "killed True, lost False"]),
+        (b"", ["attached", "killed False, lost True"]),
+    ],
+)  # fmt: skip
+def test_a_shared_machine_is_notified_of_each_debugger_and_the_next_one_may_come(
+    sent: bytes, notified: list[str]
+) -> None:
+    port, target = GdbPort(0), Shared()
+    try:
+        for count in (1, 2):
+            with socket.create_connection(("127.0.0.1", port.port), timeout=LIMIT_S) as line:
+                line.sendall(frame(b"QStartNoAckMode"))
+                port.serve(target, LIMIT_S)
+                assert listen(line) == b"OK"
+                if sent:
+                    line.sendall(sent)
+                else:
+                    line.shutdown(socket.SHUT_WR)
+                port.serve(target, LIMIT_S)
+                if "killed" in notified[-1]:
+                    while line.recv(64):
+                        pass  # the answer, and the end: its line is closed at once
+            if "killed" not in notified[-1]:
+                port.serve(target, LIMIT_S)
+                assert target.notified.pop() == "killed False, lost True"
+            assert target.notified == notified * count
+    finally:
+        port.close()
+
+
+@pytest.mark.parametrize(("leaves", "runs_on"), [(b"D", True), (b"vKill;1", False)])
+def test_a_program_that_was_detached_from_runs_past_what_it_was_halted_at(leaves: bytes, runs_on: bool) -> None:
+    board = BluePill(DODGE)
+    server, found = GdbServer(LoneChip(board), 0), list[bool]()
+    thread = threading.Thread(target=lambda: found.append(server.serve()), daemon=True)
+    thread.start()
+    try:
+        with socket.create_connection(("127.0.0.1", server.port), timeout=LIMIT_S) as line:
+            start = board.pc
+            assert talk(line, b"s") == b"T05thread:1;"
+            for address in (start, board.pc, board.pc + 2, board.pc + 4):
+                assert talk(line, b"Z0,%x,2" % address) == b"OK"
+            line.sendall(frame(leaves))
+            thread.join(LIMIT_S)
+    finally:
+        server.close()
+    assert found == [runs_on]
+    before = board.now_ns
+    assert board.advance_to(before + 1_000_000).now >= before + 1_000_000

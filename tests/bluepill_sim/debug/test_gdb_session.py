@@ -94,6 +94,24 @@ def test_flash_is_programmed_as_load_does(debug) -> None:
     assert gdb("s") == "T05thread:1;"
 
 
+def test_a_page_that_is_erased_and_written_in_part_is_erased_behind_it(debug) -> None:
+    gdb = debug(LOOP)
+    gdb("M8001000,8:0101010101010101")
+    assert gdb("vFlashErase:8001000,400") == gdb(b"vFlashWrite:8001000:\2\3") == gdb("vFlashDone") == "OK"
+    assert gdb("m8001000,8") == "0203ffffffffffff"
+    assert gdb(b"vFlashWrite:8001000:\4") == gdb("vFlashErase:8001000,400") == gdb("vFlashDone") == "OK"
+    assert gdb("m8001000,2") == "ffff", "in the order in which they came"
+
+
+def test_flash_that_is_programmed_in_part_is_a_change_too(debug) -> None:
+    gdb = debug(LOOP)
+    gdb("s")
+    assert gdb(b"vFlashWrite:8001000:\4") == gdb(b"vFlashWrite:10000000:\4") == "OK"
+    assert gdb("vFlashDone") == "E0e"
+    assert gdb("m8001000,1") == "04"
+    assert gdb("bs") == "T05replaylog:begin;thread:1;", "what was before it has led elsewhere"
+
+
 def test_breakpoints_stop_before_and_again_each_time(debug) -> None:
     gdb = debug(LOOP)
     gdb.break_at("work")

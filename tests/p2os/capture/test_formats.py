@@ -216,5 +216,11 @@ def test_pcapng_is_read_with_the_resolution_that_it_declares(order: str) -> None
     for cut in (len(data) - 1, len(section) + 3):
         with pytest.raises(FileError, match="cut off"):
             read_capture(data[:cut])
+    # A section declares its own interfaces: those of the one before are gone (section 4.1 of the draft).
+    again = section + microseconds + packet(0, 5_000_008, b"\0" + VEL)
+    assert read_capture(data + again) == capture_of([(0, TO, SYNC0), (7_000, TO, VEL), (8_000, TO, VEL)])
+    for late in (section + packet(0, 0, b"\0"), again + packet(1, 5_000_009, b"\0" + VEL)):
+        with pytest.raises(FileError, match="never declared"):
+            read_capture(data + late)
     with pytest.raises(FileError, match="never declared"):
         read_capture(section + packet(0, 0, b"\0"))

@@ -317,6 +317,66 @@ def test_a_bridge_passes_on_before_it_shows_and_sends_the_closing_frames_when_sh
         joined.client.read()
 
 
+def test_a_bridge_says_that_stop_was_sent_where_the_line_has_taken_it() -> None:
+    chunks: list[Chunk] = []
+    joined = Joined(chunks.append)
+    joined.robot.close()
+    joined.bridge.turn()
+    assert joined.reported[-2] == "the session was open, and no STOP can be sent: the robot's watchdog stops it"
+    assert [chunk.data for chunk in chunks] == [SIP]
+
+
+def test_a_bridge_knows_of_a_client_what_that_one_has_sent() -> None:
+    """The first is gone before the line follows it to another speed, the second has no session, the third none left."""
+    loops, reported, stops, now = Loops(), [], [], 0
+    robots = loops.listen("robot")
+    bridge = TapBridge(
+        loops.listen("client"), loops.connect("robot"), lambda: loops.connect("robot"),
+        on_chunk=lambda _chunk: None, on_event=reported.append, clock=lambda: now,
+    )  # fmt: skip
+    for sent in (VEL_200 + Command(CommandNumber.HOSTBAUD, 2).to_frame().to_bytes(), b"", VEL_200 + STOP_FIRST):
+        client = loops.connect("client")
+        bridge.turn()
+        robot = robots.accept()
+        for data in (b"", sent):
+            now += 30 * NS_PER_MS
+            robot.write(b"" if data or not sent else SIP)
+            client.write(data)
+            bridge.turn()
+        client.close()
+        bridge.turn()
+        stops.append(b"")
+        with contextlib.suppress(HungUpError):
+            stops[-1] = robot.read().removeprefix(sent)
+    assert stops == [STOP_FIRST, b"", b""]
+    assert [line for line in reported if "client " not in line] == ["the session was open: sent STOP, VEL 0 and CLOSE"]
+    assert not [line for line in reported if "switches the line" in line]
+
+
+@pytest.mark.usefixtures("no_waiting")
+@pytest.mark.parametrize("breaks", [False, True])
+def test_a_recording_has_what_the_line_took_and_nothing_else(breaks: bool) -> None:
+    """Also at its end: what closes the session, or nothing where the line is gone."""
+    syncs = [Command(number).to_frame().to_bytes() for number in (0, 1)]
+    identity = Identity("Fritz", "Pioneer", "p3dx-sh").to_frame().to_bytes()
+    answers = [*syncs, identity, *[b""] * 20, SIP]
+    line = Line(*answers, HungUpError("gone") if breaks else KeyboardInterrupt())
+    take = line.write
+
+    def write(data: bytes) -> None:
+        if breaks and not line.says:
+            raise HungUpError("gone")
+        take(data)
+
+    line.write = write  # type: ignore[method-assign]
+    chunks: list[Chunk] = []
+    with pytest.raises((HungUpError, KeyboardInterrupt)):
+        record_session(line, chunks.append, clock=Clock())
+    assert b"".join(chunk.data for chunk in chunks if chunk.direction is TO) == line.received
+    assert line.received.endswith(Command(CommandNumber.CLOSE).to_frame().to_bytes()) is not breaks
+    assert b"".join(chunk.data for chunk in chunks if chunk.direction is FROM) == b"".join(answers)
+
+
 @pytest.mark.usefixtures("no_waiting")
 def test_a_replay_that_has_paused_stops_the_robot() -> None:
     drive = capture_of([(0, TO, VEL_200), (60 * NS_PER_S, TO, Command(0).to_frame().to_bytes())])

@@ -20,6 +20,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from p2os.cli.held_robot import RobotWatch, problem_of
 from p2os.cli.links.bench import LinkBenchmark, lines_of, measure
 from p2os.cli.links.ports import guess
+from p2os.cli.robots.drive import DriveRequest, carry_out
 from p2os.cli.robots.send import make_command
 from p2os.client import (
     DeadmanStopped,
@@ -31,6 +32,7 @@ from p2os.client import (
     ReconnectPlanned,
     Robot,
 )
+from p2os.client.goals import MotionResult
 from p2os.client.notices import words_of
 from p2os.errors import RemoteProtocolError, TransportError
 from p2os.pioneer.controller import Pioneer
@@ -407,3 +409,25 @@ def seen_until(driver: Driver, words: str) -> str:
             except OSError:  # it has ended, and its terminal with it
                 break
     return seen
+
+
+class AskedRobot:
+    """A robot that does at once what it is asked, and keeps it."""
+
+    def __init__(self) -> None:
+        self.asked: list[tuple[str, float, float | None]] = []
+
+    def drive(self, way_m: float, *, speed_mps: float | None) -> MotionResult:
+        self.asked.append(("drive", way_m, speed_mps))
+        return MotionResult(way_m, way_m, 0)
+
+    def turn(self, angle_rad: float, *, speed_radps: float | None) -> MotionResult:
+        self.asked.append(("turn", angle_rad, speed_radps))
+        return MotionResult(angle_rad, angle_rad, 0)
+
+
+@pytest.mark.parametrize("speeds", [(None, None), (0.2, None), (None, 0.5), (0.2, 0.5)])
+def test_each_way_has_its_own_speed(speeds: tuple[float | None, float | None]) -> None:
+    robot = AskedRobot()
+    carry_out(DriveRequest(forward_m=1.0, turn_rad=-2.0, speed_mps=speeds[0], rate_radps=speeds[1]), robot)
+    assert robot.asked == [("drive", 1.0, speeds[0]), ("turn", -2.0, speeds[1])]

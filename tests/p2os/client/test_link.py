@@ -327,9 +327,25 @@ def test_the_rate_is_raised_where_the_robot_asks_for_it() -> None:
     rig.core.close(rig.now)
     rig.run(1)
     rig.robot_baud = 9600
-    begun = rig.now
+    begun, sent = rig.now, len(rig.sent)
     rig.connect()
     assert rig.now - begun < S, "after CLOSE the robot is back at its own rate, and looked for there"
+    assert rig.commands()[sent:].count(SYNC0) == 1, "at once"
+
+
+def test_a_change_of_rate_that_a_loss_has_cut_short_is_none_of_the_next_session() -> None:
+    rig = Rig(baud=9600)
+    offer_raise(rig, obeys=True)
+    rig.connect()
+    rig.until(lambda: rig.core.baud == 38400, within_s=1)
+    rig.pull()
+    rig.until(lambda: rig.core.link is Link.WAITING, within_s=5)
+    assert rig.core._supervisor._raise_due() is None, "a deadline that is over would be due for ever"
+    rig.robot_baud = 9600
+    rig.plug()
+    rig.until(lambda: rig.core.link is Link.OPEN and rig.core.is_ready)
+    assert len(rig.notices(Connected)) == 2
+    assert rig.notices(BaudKept) == []
 
 
 def test_a_rate_that_the_robot_does_not_take_is_left_again() -> None:

@@ -1,5 +1,6 @@
 """The pytest plugin as a user meets it: markers, a boot that is shared, failures that say what to look at."""
 
+import os
 import re
 from pathlib import Path
 from xml.etree import ElementTree as ET
@@ -98,12 +99,12 @@ def test_without_a_bench(): assert 1 == 2
 
 @pytest.mark.slow
 def test_a_failure_says_what_was_wanted_what_happened_last_and_where_to_look(pytester: pytest.Pytester) -> None:
-    result = run(pytester, FAILED, "--junitxml", "junit.xml", "--bench-body", "best")
+    result = run(pytester, FAILED, "--junitxml", "junit.xml", "--bench-body", "best", "--bench-mode", "adapter")
     result.assert_outcomes(failed=4, errors=3)
     result.stdout.fnmatch_lines([
         "E *ExpectationError: 'usart1 sends take-off' did not happen, from 0.700 s to 1.000 s",
         "*last events:*", "*fault inject: link-down*",
-        f"*replay:   pytest 'test_mine.py::test_it_flies' --bench-body {resolve_body(BEST)}",
+        f"*replay:   pytest 'test_mine.py::test_it_flies' --bench-mode adapter --bench-body {resolve_body(BEST)}",
     ])  # fmt: skip
     out = result.stdout.str()
     assert "there is no scenario 'motorz' (hint: did you mean 'motors'?)" in out
@@ -163,6 +164,28 @@ def test_a_misuse_shows_the_tests_own_line_the_error_and_its_hint_and_none_of_ou
         "*def fails()*", "E *mine", "E *hint: yours",
     ])  # fmt: skip
     assert "selection.py" in run(pytester, MISUSED, "--bench-record", "none", "--full-trace").stdout.str()
+
+
+def test_a_bench_is_there_for_the_next_test_that_wants_the_same_and_for_no_other(tmp_path: Path) -> None:
+    from robot_bench.cli.pytest_plugin import _Pool
+    from robot_bench.scenario.loading import load_scenario
+
+    shipped, pool = load_scenario("motors"), _Pool()
+    firmware = tmp_path / "mine.elf"
+    firmware.write_bytes(shipped.firmware.read_bytes())
+    wanted = load_scenario("motors", firmware=firmware).with_options(mode="direct", body="kinematic")
+    first, beside = pool.take(wanted, None), pool.take(wanted, None)
+    assert first is not beside, "another test has the first one still"
+    pool.give_back(first)
+    assert pool.take(wanted, None) is first
+    pool.give_back(first)
+    assert pool.take(wanted.with_options(seed=1), None) is not first
+    when = firmware.stat().st_mtime_ns
+    os.utime(firmware, ns=(when, when + 1))  # built anew, as large as before
+    assert pool.take(wanted, None) is not first
+    os.utime(firmware, ns=(when, when))
+    assert pool.take(wanted, None) is first
+    assert (pool.built, pool.reused) == (4, 2)
 
 
 def test_seeds_are_those_of_the_command_line() -> None:

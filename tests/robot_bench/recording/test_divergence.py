@@ -71,3 +71,26 @@ def test_the_verb_says_what_parts_first_and_what_came_before(tmp_path: Path) -> 
     ]
     alike = CliRunner().invoke(app, [one, one])
     assert (alike.exit_code, alike.stdout) == (0, "alike: 3 events\n")
+
+
+def fleet(folder: Path, **robots: Event) -> str:
+    """The folder of a run of robots "a" and "b"; one without an event has left no trace."""
+    for name, event in robots.items():
+        write(folder / name, event)
+        trace = folder / name / "trace.jsonl"
+        trace.write_text(trace.read_text().replace('"s"', '"s","robots":["a","b"]'), encoding="utf-8")
+    return str(folder)
+
+
+def test_two_runs_differ_in_the_same_whichever_is_named_first(tmp_path: Path) -> None:
+    """Also where one of them has a robot that the other has not."""
+    app = typer.Typer()
+    diff.register(app)
+    same, edge = Note(t=1, who="adapter", what="driving"), PinEdge(t=3, wire="DD4", level=True)
+    for name in ("one", "other"):
+        (tmp_path / name).mkdir()
+    one, other = fleet(tmp_path / "one", a=same), fleet(tmp_path / "other", a=same, b=edge)
+    for words in ([one, other], [other, one]):
+        said = CliRunner().invoke(app, words)
+        assert (said.exit_code, "alike until 0.000000 s; b: DD4 differs first" in said.stdout) == (1, True)
+    assert CliRunner().invoke(app, [other, other]).exit_code == 0

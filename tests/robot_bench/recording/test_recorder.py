@@ -6,11 +6,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bluepill_sim.peripherals.i2c import I2cStep, I2cSymbol
+from bluepill_sim.peripherals.spi import SpiWord
 from p2os.errors import LocalProtocolError
-from robot_bench.events.kinds import Text
+from robot_bench.events.kinds import I2cTransfer, SpiTransfer, Text
 from robot_bench.recording.recorder import LONGEST_TEXT, Recorder
 from robot_bench.recording.run_record import record_of
 from robot_bench.recording.trace import TraceWriter
+from robot_bench.recording.transfers import I2cTransfers, SpiTransfers
 from robot_bench.wires.nets import Harness, Net, Strength
 
 NETS = ("DD1", "DD2")
@@ -116,3 +119,34 @@ def test_characters_in_any_portions_make_the_lines_that_they_make_one_by_one(wor
             line.clear()
     assert texts == expected
     assert recorder.unfinished_text == line
+
+
+#: Where something comes from, and what.
+SENT = st.lists(st.tuples(st.sampled_from(["usart1", "usart2", "usb", "spi1", "i2c1"]), st.sampled_from([10, 65, 66])))
+
+
+@given(sent=SENT, passes=st.sets(st.integers(0, 30)))
+@settings(max_examples=60)
+def test_a_run_that_ends_anywhere_has_all_that_came_before(sent: list[tuple[str, int]], passes: set[int]) -> None:
+    """Lines without an end, words of an SPI before the pause, and bytes of an I2C before the STOP."""
+    recorder = Recorder(TraceWriter(), Harness([]), body=None)
+    recorded = {name: bytearray() for name in ("usart1", "usart2", "usb", "spi1", "i2c1")}
+    recorder.events.subscribe(lambda event: recorded[event.port].extend(event.data), Text)
+    recorder.events.subscribe(lambda event: recorded[event.bus].extend(event.from_master), SpiTransfer)
+    recorder.events.subscribe(lambda event: recorded[event.bus].extend(event.data), I2cTransfer)
+    spi, i2c = SpiTransfers("spi1", recorder.events.publish), I2cTransfers("i2c1", recorder.events.publish)
+    recorder.transfers |= {"spi1": spi, "i2c1": i2c}
+    i2c.take([I2cSymbol(1, I2cStep.START, 0, False), I2cSymbol(2, I2cStep.BYTE, 0xA0, True)])
+    at = 10
+    for number, (name, word) in enumerate(sent):
+        at += 20_000
+        if name == "spi1":
+            spi.take([SpiWord(at, word, 0, 8, 1_000)])
+        elif name == "i2c1":
+            i2c.take([I2cSymbol(at, I2cStep.BYTE, word, True)])
+        else:
+            recorder.usart([(word, at)], name)
+        if number in passes:
+            recorder.advance_to(at + 1)
+    recorder.finish(at + 1)
+    assert recorded == {name: bytes(word for place, word in sent if place == name) for name in recorded}

@@ -1,5 +1,6 @@
 """A run folder belongs to one run at a time, and a finished run is overwritten only where that is asked for."""
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -9,7 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from robot_bench.recording.run_folder import make_next_folder, reserved
+from robot_bench.recording import run_folder
+from robot_bench.recording.run_folder import FILES, TRACE_NAME, VARIABLES_NAME, make_next_folder, reserved
+from robot_bench.report.page_of_all import REPORT_NAME
 from simbase.errors import UsageError
 
 HOLDER = """
@@ -46,6 +49,36 @@ def test_a_folder_that_another_run_writes_is_refused_with_a_hint(tmp_path: Path)
         process.communicate(timeout=20)
     with reserved(tmp_path / "run"):
         pass
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+@pytest.mark.parametrize("force", [False, True])
+@pytest.mark.parametrize("why", ["another run", "no run"])
+def test_a_folder_that_is_refused_is_as_it_was(why: str, force: bool, tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    with contextlib.ExitStack() as stack:
+        if why == "another run":
+            stack.enter_context(reserved(run))
+            (run / TRACE_NAME).write_text("what the other run has written so far\n", encoding="utf-8")
+        else:
+            run.mkdir()
+            (run / VARIABLES_NAME).write_text("no trace beside it\n", encoding="utf-8")
+        before = contents(run)
+        with pytest.raises(UsageError, match=why), reserved(run, force=force):
+            pass
+        assert contents(run) == before
+
+
+def test_nothing_that_a_run_may_write_outlives_it(tmp_path: Path) -> None:
+    named = {name for key, name in vars(run_folder).items() if key.endswith("_NAME")}
+    assert {"trace.jsonl", "variables.jsonl", "page.p2vf"} <= named
+    for name in (*named, REPORT_NAME, *FILES):
+        (tmp_path / name).touch()
+    with reserved(tmp_path, force=True):
+        assert contents(tmp_path) == {}
 
 
 def test_a_run_that_was_killed_leaves_its_folder_free(tmp_path: Path) -> None:

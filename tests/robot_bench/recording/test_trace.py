@@ -116,6 +116,21 @@ def test_a_file_goes_on_where_it_stood_and_what_came_after_is_taken_back(tmp_pat
         assert (tmp_path / "trace").read_bytes() == whole
 
 
+@pytest.mark.parametrize("is_file", [True, False])
+def test_a_run_that_goes_back_and_ends_sooner_has_no_rows_of_the_longer_one(is_file: bool, tmp_path: Path) -> None:
+    path = tmp_path / "trace" if is_file else None
+    trace = begun(path)
+    saved = trace.snapshot()
+    trace.take([note(n, "of the longer one") for n in range(7, 40)], 40)
+    trace.flush()
+    trace.restore(saved)
+    trace.take([note(7)], 10)
+    assert trace.sha256 == chain("".join(line for line in trace.lines() if not line.startswith('{"k": ')))
+    assert trace.length == len("".join(trace.lines()))
+    assert "longer" not in "".join(trace.lines())
+    trace.close()
+
+
 def test_a_trace_in_memory_goes_on_in_a_file(tmp_path: Path) -> None:
     first = begun(None)
     again = TraceWriter(tmp_path / "trace")

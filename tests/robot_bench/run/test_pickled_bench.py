@@ -149,6 +149,25 @@ def test_what_was_printed_last_is_known_after_a_restart() -> None:
     assert run_of(loaded(pickle.dumps(bench))).recorder.last_line == run_of(bench).recorder.last_line
 
 
+def test_a_bench_that_was_restarted_is_as_one_that_was_just_built() -> None:
+    """Nothing of its life before comes again: no listener, no fault, and no state to rewind to."""
+    bench, seen = Bench(scenario(duration_s=0.5)), list[object]()
+    begin = bench.snapshot()
+    bench.events.subscribe(seen.append)
+    bench.run_until("50 ms")
+    bench.inject("sonar-dead 1")
+    bench.run_until("60 ms")
+    bench.checkpoint()
+    bench.restart(begin)
+    seen.clear()
+    bench.run_until("80 ms")
+    bench.rewind("70 ms")
+    new = Bench(scenario(duration_s=0.5))
+    new.run_until("70 ms")
+    assert (bench.now, bench.record().faults, seen) == (new.now, [], [])
+    assert finished(bench) == finished(new)
+
+
 def test_a_run_can_be_made_longer_where_it_goes_on() -> None:
     bench, longer = Bench(scenario(duration_s=0.5)), Bench(scenario(duration_s=0.7))
     bench.run_until(S // 4)

@@ -13,9 +13,12 @@ from p2os.errors import ScenarioError
 from robot_bench import Bench, Scenario
 from robot_bench.cli.shown.targets import run_target
 from robot_bench.events.kinds import Pose, Ranges, Text, WorldChange
+from robot_bench.recording.run_folder import TRACE_NAME
 from robot_bench.recording.run_record import read_events
 from robot_bench.recording.together import named_events, robots_in
 from robot_bench.report import make
+from robot_bench.report.make import Files
+from robot_bench.run import run_together
 from robot_bench.scenario.loading import read_scenario
 from simbase.errors import UsageError
 from tests.p2os.view.pages import ReadPage
@@ -174,6 +177,22 @@ def test_the_first_that_ends_ends_the_run_for_all(tmp_path: Path) -> None:
     bench.run_until("3 s")
     assert bench.now < 2_000_000_000
     assert bench.judge().met == ["b: prints 'motors: ready'"]
+
+
+@pytest.mark.parametrize(("met", "asked"), [("ab", True), ("a", False), ("b", False), ("", False)])
+def test_a_run_passed_where_each_of_its_robots_has(met: str, asked: bool, tmp_path: Path) -> None:
+    """Whoever keeps failures alone keeps a run in which one robot fails."""
+    kinds = {True: 'kind = "no_collision"', False: 'kind = "min_distance"\ndistance_m = 9'}
+    goals = [f'[[goal]]\nrobot = "{name}"\n{kinds[name in met]}\n' for name in "ab"]
+    several, reported = two(tmp_path, "direct", more="".join(goals), duration=0.02), list[bool]()
+
+    def is_kept(passed: bool) -> bool:
+        reported.append(passed)
+        return not passed
+
+    result = run_together(several, tmp_path / "run", is_kept=is_kept, files=Files.SUMMARY)
+    assert (reported, result.passed) == ([asked], asked)
+    assert [(tmp_path / "run" / name / TRACE_NAME).exists() for name in "ab"] == [not asked] * 2
 
 
 def test_robots_of_three_kinds_share_a_world(tmp_path: Path) -> None:

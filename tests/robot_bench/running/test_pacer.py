@@ -49,6 +49,19 @@ def test_lag_is_reported_and_the_worst_is_kept() -> None:
     assert (pacer.lag_ns, pacer.worst_lag_ns) == (0, 3_000_000)
 
 
+def test_a_pacer_that_is_started_anew_is_as_a_new_one() -> None:
+    clock = Clock()
+    used = RealTimePacer(speed=2.0, clock=clock, sleep=clock.sleep)
+    used.start(3)
+    clock.now += 7_000_000
+    used.keep_pace(4_000_000)
+    assert used.worst_lag_ns
+    fresh = RealTimePacer(speed=2.0, clock=clock, sleep=clock.sleep)
+    for pacer in (used, fresh):
+        pacer.start(4_000_000)
+    assert vars(used) == vars(fresh)
+
+
 def test_a_sleep_that_lasts_longer_is_lag_at_once() -> None:
     clock = Clock()
     pacer = RealTimePacer(clock=clock, sleep=lambda _: setattr(clock, "now", clock.now + 3 * 10**9))

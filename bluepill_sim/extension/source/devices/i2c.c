@@ -579,6 +579,10 @@ static void end_far(struct device *device, uint64_t ns)
         tell(device, ns, TELL_BYTE, step == FAR_READ ? answer | (byte ? HELD : 0) : byte | (answer & HELD));
     }
     i2c->far = ask(device, NEXT_STEP, answer);
+    if (step == FAR_STOP && i2c->rate_hz != i2c->far_hz) { /* the next master has another clock */
+        run_from(device, ns);
+        i2c->rate_hz = i2c->far_hz;
+    }
     go_on_far(device, ns);
 }
 

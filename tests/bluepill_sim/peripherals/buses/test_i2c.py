@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bluepill_sim.parts import Eeprom24C02
+from bluepill_sim.peripherals.i2c import I2cStep, I2cSymbol
 
 PE, SMBUS, SMBTYPE, ENPEC, ENGC, NOSTRETCH, START, STOP, ACK, POS, PEC, ALERT, SWRST = (
     1 << n for n in (0, 1, 3, 5, 6, 7, 8, 9, 10, 11, 12, 13, 15)
@@ -630,6 +631,41 @@ def test_a_slave_receives_what_is_written_and_stopf_ends_it(fake_chip: Any) -> N
     fake_chip.write("I2C1.CR1", PE | ACK)
     assert sr1(fake_chip) == 0
     assert part.answered[0].acknowledged == 3
+
+
+def test_each_master_outside_has_its_own_clock(fake_chip: Any) -> None:
+    part = slave(fake_chip)
+    fake_chip.write("I2C1.CR1", PE)  # no address of its own is acknowledged: nobody stretches
+    begun_ns, symbols = fake_chip.now_ns, []
+    part.subscribe(symbols.extend)
+    for hz in (100_000, 400_000, 50_000):
+        part.call(0x30, b"\1", hz=hz)
+    wait(fake_chip, 10**6)
+    part.deliver()
+    starts = [symbol.ended_ns - begun_ns for symbol in symbols if symbol.step is I2cStep.START]
+    stops = [symbol.ended_ns - begun_ns for symbol in symbols if symbol.step is I2cStep.STOP]
+    # START and address are ten bits, STOP is one.
+    assert stops == [110_000, 110_000 + 27_500, 110_000 + 27_500 + 220_000]
+    assert starts == [100_000, 110_000 + 25_000, 110_000 + 27_500 + 200_000]
+    assert [call.hz for call in part.answered] == [100_000, 400_000, 50_000]
+
+
+@pytest.mark.parametrize("is_heard", [True, False])
+def test_who_hears_a_bus_is_no_part_of_its_snapshot(fake_chip: Any, is_heard: bool) -> None:
+    """Who came after it hears on when it is put back, and who has left does not keep the chip telling."""
+    set_up(fake_chip, device=Eeprom24C02())
+    part, heard = fake_chip.parts.by_name["I2C1"], list[I2cSymbol]()
+    end = None if is_heard else part.subscribe(heard.extend)
+    saved = part.snapshot()
+    if end is None:
+        part.subscribe(heard.extend)
+    else:
+        end()
+    part.restore(saved)
+    start(fake_chip, 0xA0)
+    assert bool(part.native.wants_words) is is_heard
+    part.deliver()
+    assert [symbol.step for symbol in heard] == [I2cStep.START, I2cStep.BYTE] * is_heard
 
 
 def test_a_slave_sends_and_the_last_byte_is_refused(fake_chip: Any) -> None:

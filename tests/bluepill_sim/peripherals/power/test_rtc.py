@@ -255,6 +255,20 @@ def test_a_power_cut_and_bdrst_take_the_time(fake_chip: Any, how: str) -> None:
     assert clock.word("CNT") == 0
 
 
+def test_bdrst_drops_what_is_being_configured(fake_chip: Any) -> None:
+    Clock(fake_chip).configure(PRL=9)
+    fake_chip.advance(fake_chip.now_ns + S)
+    fake_chip.write("RTC.CRL", CNF)
+    for name in ("PRLH", "PRLL", "CNTH", "CNTL", "ALRH", "ALRL"):
+        fake_chip.write(f"RTC.{name}", 7)
+    fake_chip.write("RCC.BDCR", 1 << 16)
+    fake_chip.write("RCC.BDCR", 0)
+    clock = Clock(fake_chip)
+    fake_chip.write("RTC.CRL", 0)
+    clock.go_to(3)
+    assert (clock.word("CNT"), clock.word("ALR"), clock.word("DIV")) == (0, WORD, 0x8000 - 3)
+
+
 @pytest.mark.parametrize(("source", "hz"), [(LSE, 32_768), (LSI, 40_000), (HSE, 62_500)])
 def test_each_clock_counts_at_its_own_speed_and_stops_with_its_source(fake_chip: Any, source: int, hz: int) -> None:
     clock = Clock(fake_chip, source, hz)

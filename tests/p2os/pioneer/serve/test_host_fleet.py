@@ -535,6 +535,22 @@ def test_a_client_with_a_session_stays_and_its_time_begins_anew_with_close(make_
     made.host.close()
 
 
+def test_a_client_has_its_time_whatever_was_before_it(make_robot: Callable[..., Any]) -> None:
+    made = Looped(make_robot(), sync_limit_ns=NS_PER_S)
+    made.line.close()
+    made.run_unread(3_000)
+    for _ in range(2):
+        made.line = made.reopen()
+        made.run_unread(1)
+        made.run_unread(998)
+        assert made.host.client is not None
+        made.run_unread(2)
+        assert made.host.client is None
+        made.run_unread(700)
+    assert [event.partition(": ")[0] for event in made.events[-4:]] == ["client connected", "client gone"] * 2
+    made.host.close()
+
+
 def test_who_has_a_terminal_open_cannot_be_sent_away(make_robot: Callable[..., Any]) -> None:
     made = Looped(make_robot(), listener=listen_url("pty:"), sync_limit_ns=NS_PER_S)
     made.run_unread(3_000)

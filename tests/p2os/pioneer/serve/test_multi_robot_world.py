@@ -435,6 +435,7 @@ def test_a_multi_robot_world_that_was_saved_goes_on_as_it_would_have(
 
     never_restored = end(made)
     for other in (made, fresh):
+        other.bring(0, half + 200 * NS_PER_MS)  # when the others act next is known, and of another past
         other.restore(saved)
         assert end(other) == never_restored
 

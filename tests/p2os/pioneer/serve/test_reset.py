@@ -89,9 +89,11 @@ def test_a_controller_that_starts_over_is_as_one_that_was_switched_on(make_robot
     robot, new = make_robot(), make_robot()
     robot.open()
     robot.say(C.SETA, 50)
+    robot.say(C.ENABLE, 1)
     robot.say(C.VEL, 200)
     robot.pioneer.do("fault low-battery 9.5", robot.now)
     robot.run(2500)
+    assert robot.body.state.left_angle_rad > 1.0, "its wheels stand elsewhere"
     robot.pioneer.start_over(robot.now)
     assert robot.frames() == []
     assert robot.pioneer.state == new.pioneer.state
@@ -105,6 +107,7 @@ def test_a_controller_that_starts_over_is_as_one_that_was_switched_on(make_robot
     behaviour = []
     for one in (robot, new):
         one.open()
+        one.say(C.ENABLE, 1)
         one.say(C.VEL, 200)
         one.run(1500)
         behaviour.append([replace(sip) for sip in one.sips()])

@@ -4,7 +4,8 @@ import math
 
 import pytest
 
-from robot_bench.events.kinds import PinEdge, WorldChange
+from robot_bench.events.kinds import PinEdge, Verdict, WorldChange
+from robot_bench.events.stream import EventStream
 from robot_bench.recording.run_record import RunRecord
 from robot_bench.scenario.goals.judging import Goal, GoalJudge, Judgement, RunEnd, judge, load_goal
 from robot_bench.scenario.goals.kinds import every_kind
@@ -214,6 +215,24 @@ def test_what_holds_so_far_is_open_where_the_time_was_cut_and_met_where_it_was_n
     assert cut.not_judged[0].endswith(": not judged before 9 s")
     for end in (RunEnd(9 * S, 9 * S), RunEnd(9 * S), RunEnd(2 * S, 9 * S, by_scenario=True)):
         assert len(judge.finish(end).met) == 1, end
+
+
+@pytest.mark.parametrize("kind", HOLDS_SO_FAR)
+def test_a_run_that_went_back_is_judged_at_its_new_end_alone(kind: str) -> None:
+    judge = GoalJudge([load_goal({"kind": kind, **HOLDS_SO_FAR[kind]}, "mine.toml: [[goal]] 1")])
+    stream, verdicts = EventStream(), list[int]()
+    stream.record(lambda events, _limit: verdicts.extend(one.t for one in events if isinstance(one, Verdict)))
+    judge.subscribe(stream)
+    saved = judge.snapshot(), stream.snapshot()
+    for end in (2 * S, None, 3 * S, None, S, None):  # None: nobody says that it ends before 4 s
+        if end is not None:
+            judge.end_at(RunEnd(end))
+        for limit in (S, 2 * S, 3 * S, 4 * S):
+            stream.release(limit)
+        assert verdicts == ([] if end is None else [end])
+        verdicts.clear()
+        judge.restore(saved[0])
+        stream.restore(saved[1])
 
 
 @pytest.mark.parametrize(
