@@ -138,7 +138,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     The latter wait for processes, some for half a minute: at the end one worker alone would. Tests that read a clock
     get their mark where a run asks for it: to find them takes 4 s.
     """
-    if config.getoption("--hypothesis-profile") != "drawn":
+    if config.getoption("--hypothesis-profile", None) != "drawn":
         from tests.tools.suite.fewer_examples import try_fewer_examples
 
         try_fewer_examples(items)
