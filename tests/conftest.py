@@ -69,7 +69,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
     An install older than pyproject.toml is refused, and plug-ins of others are hidden.
 
-    Examples are the same in each run, so that a commit that passes does so again; `make soak` draws others.
+    Examples are the same in each run, so that a commit that passes does so again; `make soak` draws others, and more.
     """
     stale = stale_points(config.rootpath)
     if stale:
@@ -138,6 +138,10 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     The latter wait for processes, some for half a minute: at the end one worker alone would. Tests that read a clock
     get their mark where a run asks for it: to find them takes 4 s.
     """
+    if config.getoption("--hypothesis-profile", None) != "drawn":
+        from tests.tools.suite.fewer_examples import try_fewer_examples
+
+        try_fewer_examples(items)
     if "real_clock" in config.option.markexpr:
         from tests.tools.suite.real_clock import reads_clock
 

@@ -17,7 +17,10 @@ OWN = (
     "pyproject.toml",
     "tests/conftest.py",
     "tests/tools/installed.py",
-    *(f"tests/tools/suite/{name}.py" for name in ("fewer_messages", "forked_workers", "forked_workers_client")),
+    *(
+        f"tests/tools/suite/{name}.py"
+        for name in ("fewer_examples", "fewer_messages", "forked_workers", "forked_workers_client")
+    ),
 )
 PART = """
 def which(first):

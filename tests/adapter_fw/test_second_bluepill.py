@@ -60,7 +60,7 @@ def model_bytes(wanted: Scenario) -> bytes:
 
 @pytest.mark.slow
 def test_dodge_is_driven_among_obstacles_without_touching_one(tmp_path: Path) -> None:
-    bench = second_bench(built("bluepill", tmp_path)[0], scenario("dodge", 8))
+    bench = second_bench(built("bluepill", tmp_path)[0], scenario("dodge", 5))
     bench.run_until(int(3.9 * NS_PER_S))
     assert bench.second.state == "driving"
     assert bench.second.report["sips"] >= 32

@@ -97,6 +97,7 @@ def test_every_row_of_the_table_names_its_source_and_values_read_as_printed() ->
     assert expected("rev-b").values["R12"] == "680R"
 
 
+@pytest.mark.soak  # reads whole libraries
 def test_the_table_s_pin_names_are_those_of_kicad_s_own_symbols() -> None:
     if not SYMBOLS.is_dir():
         pytest.skip("KiCad's symbol libraries are not installed (Debian: kicad-symbols of the same version)")

@@ -77,7 +77,7 @@ def test_random_programs_agree_with_qemu(seed: int, tmp_path: Path) -> None:
 @needs_qemu
 @pytest.mark.slow
 def test_thousands_of_random_blocks_agree_with_qemu(tmp_path: Path) -> None:
-    assert sum(compare(seed, 250, tmp_path) for seed in range(10, 18)) > 8_000
+    assert sum(compare(seed, 250, tmp_path) for seed in range(10, 12)) > 2_000
 
 
 @needs_qemu

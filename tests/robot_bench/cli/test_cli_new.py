@@ -238,6 +238,19 @@ def test_make_test_takes_the_pytest_beside_p2os_and_not_the_first_on_the_path(tm
     assert "hint: pip install pytest, where p2os is" in done.stderr
 
 
+def notices(*slips: tuple[str, str, str]) -> None:
+    """Hold the tests of a project to what they notice: each is what is right, what is wrong, and the failing test."""
+    main = Path("mine/main.c")
+    text = main.read_text(encoding="utf-8")
+    for right, wrong, noticed in slips:
+        assert right in text
+        main.write_text(text.replace(right, wrong), encoding="utf-8")
+        words = f"PYTEST={forked_pytest()} -q --tb no --bench-record none -k {noticed.partition('[')[0]}"
+        failed = make("test", words, "-s")
+        assert failed.returncode != 0
+        assert f"FAILED tests/test_robot.py::{noticed}" in failed.stdout, failed.stdout
+
+
 @needs_compiler
 @pytest.mark.slow
 def test_the_tests_of_a_new_project_pass_and_notice_what_was_broken() -> None:
@@ -246,26 +259,12 @@ def test_the_tests_of_a_new_project_pass_and_notice_what_was_broken() -> None:
     written = tests.read_text(encoding="utf-8")
     assert written.count('during="30 s"') == 1
     tests.write_text(written.replace('during="30 s"', 'during="8 s"'), encoding="utf-8")  # below they are as written
-    pytest_here = f"PYTEST={forked_pytest()} -q"
-    done = make("test", pytest_here)
+    done = make("test", f"PYTEST={forked_pytest()} -q")
     assert "12 passed" in done.stdout, done.stdout
-    main = Path("mine/main.c")
-    text = main.read_text(encoding="utf-8")
-    for right, wrong, noticed in (
-        ("sleep_ticks(3u *", "sleep_ticks(2u *", "test_it_stands_until_three_seconds"),
-        (
-            "seen & LEFT_AHEAD ? &turn_right",
-            "seen & LEFT_AHEAD ? &turn_left",
-            "test_it_turns_away_from_what_a_sonar_sees",
-        ),
+    notices(
         ("(1u << 2 | 1u << 3)", "(1u << 1 | 1u << 2)", "test_it_turns_away_from_what_a_sonar_sees[4-right]"),
         ("sleep_ticks(1))", "sleep_ticks(7))", "test_the_motors_answer_a_sensor_within_20_ms"),
-    ):
-        assert right in text
-        main.write_text(text.replace(right, wrong), encoding="utf-8")
-        failed = make("test", f"{pytest_here} --tb no --bench-record none -k {noticed.partition('[')[0]}", "-s")
-        assert failed.returncode != 0
-        assert f"FAILED tests/test_robot.py::{noticed}" in failed.stdout, failed.stdout
+    )
 
 
 @needs_compiler
@@ -274,6 +273,10 @@ def test_the_tests_of_a_new_project_pass_as_they_are_written() -> None:
     project.write_project(Path("mine"), project.project_files("kinematic"))
     done = make("test", f"PYTEST={forked_pytest()} -q")
     assert "12 passed" in done.stdout, done.stdout
+    notices(
+        ("sleep_ticks(3u *", "sleep_ticks(2u *", "test_it_stands_until_three_seconds"),
+        ("? &turn_right", "? &turn_left", "test_it_turns_away_from_what_a_sonar_sees"),
+    )
 
 
 @needs_compiler

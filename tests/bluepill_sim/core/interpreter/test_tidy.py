@@ -165,7 +165,7 @@ def word_of_few(dice: random.Random) -> int:
     return word
 
 
-@pytest.mark.parametrize("count", [500, pytest.param(10_000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [1_500, pytest.param(10_000, marks=pytest.mark.soak)])
 def test_what_reads_what_was_done_last_does_what_it_does_on_unicorn(lockstep: Lockstep, count: int) -> None:
     dice = random.Random(40)
     cases = []

@@ -153,7 +153,7 @@ def test_a_bus_reset_in_the_midst_of_data_enumerates_anew(boards: Boards) -> Non
 
 
 @pytest.mark.parametrize("what", ["to device", "to host", "ack"])
-@pytest.mark.parametrize("places", [range(0, 37, 9), pytest.param(range(37), marks=pytest.mark.slow)], ids=len)
+@pytest.mark.parametrize("places", [range(0, 37, 7), pytest.param(range(37), marks=pytest.mark.soak)], ids=len)
 def test_a_packet_lost_in_any_transaction_is_made_up_for(boards: Boards, what: str, places: range) -> None:
     """Those of the enumeration, and of the echo behind it."""
     board = boards()
