@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from p2os.errors import LocalProtocolError
 from robot_bench.bench import Bench
-from robot_bench.events.codec import RANKS, Levels, event_of, events_of, line_of
+from robot_bench.events.codec import LAST_NS, RANKS, Levels, event_of, events_of, line_of
 from robot_bench.events.kinds import (
     HULL_PARTS,
     KINDS,
@@ -45,7 +45,7 @@ from tests.robot_bench.wires.fake_chip import FakeChip, PinDrive
 
 S, MS = 10**9, 10**6
 whole = st.integers(-(2**62), 2**62)
-times = st.integers(0, 2**62)
+times = st.integers(0, LAST_NS)
 words = st.text(max_size=8)
 #: Micrometres are what a contact keeps.
 metres = st.integers(-(10**9), 10**9).map(lambda um: um / 1e6)
