@@ -41,8 +41,10 @@ def remember(key: str, file: Path) -> None:
     with writing(path):
         path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
         path.touch(mode=0o600)
-        with path.open("a", encoding="utf-8") as there:
-            there.write(f"{line}\n")
+        with path.open("ab+") as there:
+            there.seek(max(0, there.tell() - 1))
+            is_cut = there.read() not in (b"", b"\n")  # a last line that a full disk or an end of power has cut
+            there.write(b"\n" * is_cut + f"{line}\n".encode())
 
 
 def configured(environment: Mapping[str, str] | None = None) -> tuple[Path, ...]:

@@ -150,10 +150,11 @@ def test_an_answer_for_one_file_of_a_folder_is_none_for_another(folder: Path, mo
         Trust().admit("other.py:C", folder, WHERE)
 
 
-def test_a_damaged_memory_forgets_and_loses_nothing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("end", ["\n", ""])  # written whole, or cut
+def test_a_damaged_memory_forgets_and_loses_nothing(folder: Path, monkeypatch: pytest.MonkeyPatch, end: str) -> None:
     kept = folder.parent / "state" / "p2os" / "trusted.jsonl"
     kept.parent.mkdir(parents=True)
-    kept.write_text('{"key": 3\n[]\nnull\n{"other": "x"}\n')
+    kept.write_text(f'{{"key": 3\n[]\nnull\n{{"other": "x"}}{end}')
     answered(monkeypatch, "y\n", folder)
     assert answered(monkeypatch, "", folder) == ""
     assert len(kept.read_text().splitlines()) == 5
