@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -79,6 +80,10 @@ def test_a_full_disk_is_one_line() -> None:
     trace = TraceWriter(Path("/dev/full"))
     with pytest.raises(RunFailedError, match="cannot write /dev/full: No space left on device"):
         trace.meta({})
+    # From then on, whether there is anything to write or not.
+    for again in (partial(trace.take, [], 0), partial(trace.take, [note(3)], 5), partial(trace.meta, {}), trace.flush):
+        with pytest.raises(RunFailedError, match="cannot write /dev/full"):
+            again()
     trace.close()
 
 
