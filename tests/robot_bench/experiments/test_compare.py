@@ -255,6 +255,18 @@ def test_a_run_its_recording_and_its_table_tell_of_one_drive(runs: Path, p2os, c
     assert found["ape_translation_m"]["max"] < 1e-3
 
 
+def test_poses_may_be_of_two_kinds(runs: Path, p2os, capsys) -> None:
+    def errors(poses: str) -> tuple[float, float]:
+        assert p2os("compare", runs / "near", runs / "near", "--poses", poses, "--shift", "0s", "--json") == 0
+        found = json.loads(capsys.readouterr().out)
+        return found["ape_translation_m"]["max"], found["ape_translation_m"]["rmse"]
+
+    same, mixed, turned = map(errors, ("truth,truth", "truth,odometry", "odometry,truth"))
+    assert same == errors("truth") == (0.0, 0.0)
+    assert min(mixed) > 0.0, "odometry counts whole ticks"
+    assert turned == pytest.approx(mixed, rel=0.2)
+
+
 @given(st.lists(st.lists(st.sampled_from(["0", "1", "-2.5", "nan", "inf", "x", "", "1e999", "\x00", "é"]), max_size=9)))
 def test_any_table_is_a_trajectory_or_told_in_one_line(rows: list[list[str]]) -> None:
     with tempfile.TemporaryDirectory() as folder:
@@ -278,6 +290,7 @@ def test_any_table_is_a_trajectory_or_told_in_one_line(rows: list[list[str]]) ->
         (["empty.tum", "near"], "two poses at least"),
         (["noise.bin", "near"], "no two standard packets"),
         (["near", "near", "--poses", "fact"], "--poses 'fact'"),
+        (["near", "near", "--poses", "truth,truth,truth"], "or two of them with a comma"),
         (["near", "near", "--align", "best"], "--align 'best'"),
         (["near", "near", "--at", "pin PB99 high"], "no wire 'PB99'"),
         (["near", "near", "--at", "contact"], "never happens"),
