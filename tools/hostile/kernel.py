@@ -39,9 +39,10 @@ def _family(pid: int) -> list[int]:
     """Return a process and all that descend from it."""
     found = [pid]
     for each in found:
-        for task in PROC.glob(f"{each}/task/*/children"):
-            with contextlib.suppress(OSError):
-                found += map(int, task.read_text().split())
+        with contextlib.suppress(OSError):  # it may end while its folder is read
+            for task in [*PROC.glob(f"{each}/task/*/children")]:
+                with contextlib.suppress(OSError):
+                    found += map(int, task.read_text().split())
     return found
 
 

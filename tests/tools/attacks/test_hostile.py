@@ -5,6 +5,7 @@ import os
 import random
 import socket
 import sys
+from collections.abc import Iterator
 from ipaddress import IPv4Address
 from pathlib import Path
 
@@ -72,6 +73,23 @@ def test_a_socket_that_others_reach_is_seen_in_the_kernels_tables(host: str, is_
         port = own.getsockname()[1]
         assert port in {each.port for each in kernel.sockets_of(os.getpid())}
         assert (port in {each.port for each in kernel.off_loopback(os.getpid())}) is is_off
+
+
+def test_a_process_may_end_while_its_family_is_looked_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Going(type(tmp_path)):  # type: ignore[misc]  # what a path is here
+        def glob(self, pattern: str) -> Iterator[Path]:
+            if pattern.startswith("8/"):
+                raise FileNotFoundError(2, "No such file or directory", f"/proc/{pattern}")
+            yield from super().glob(pattern)
+
+    page_kb = os.sysconf("SC_PAGESIZE") // 1024
+    for pid, children in ((7, "8 9"), (8, ""), (9, "")):
+        (tmp_path / f"{pid}/task/{pid}").mkdir(parents=True)
+        (tmp_path / f"{pid}/task/{pid}/children").write_text(children)
+        (tmp_path / f"{pid}/statm").write_text(f"{pid} {10 * pid} 0")
+    (tmp_path / "8/statm").unlink()
+    monkeypatch.setattr(kernel, "PROC", Going(tmp_path))
+    assert kernel.memory_kb(7) == (70 + 90) * page_kb
 
 
 def test_a_socket_whose_datagrams_the_kernel_drops_is_not_reached() -> None:
