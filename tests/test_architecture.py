@@ -466,6 +466,11 @@ def shown_names() -> dict[str, set[str]]:
     }
 
 
+def test_no_link_is_committed() -> None:
+    listed = subprocess.run(["git", "ls-files", "-s"], cwd=ROOT, capture_output=True, text=True, check=False).stdout
+    assert [line for line in listed.splitlines() if line.startswith("120000")] == []
+
+
 def test_a_folder_shows_no_more_names_than_one_looks_through() -> None:
     folders = shown_names()
     if not folders:
