@@ -40,7 +40,7 @@ def _family(pid: int) -> list[int]:
     found = [pid]
     for each in found:
         with contextlib.suppress(OSError):  # it may end while its folder is read
-            for task in [*PROC.glob(f"{each}/task/*/children")]:
+            for task in PROC.glob(f"{each}/task/*/children"):
                 with contextlib.suppress(OSError):
                     found += map(int, task.read_text().split())
     return found

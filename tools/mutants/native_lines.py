@@ -21,6 +21,7 @@ from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
 
+from tools.mutants.judge import SHORT
 from tools.mutants.natives import Library, libraries, sources_digest
 from tools.mutants.nearest import Counted, Nearest
 from tools.mutants.tree import Tree
@@ -28,8 +29,9 @@ from tools.mutants.tree import Tree
 #: Where counts are kept, in the project.
 KEPT = Path("build", "mutants", "native_lines.jsonl")
 #: Which tests run, and how long a file of them may take by the clock.
-PYTEST = ("-m", "pytest", "-n", "0", "-p", "no:cacheprovider", "-m", "not slow and not soak and not hardware",
-          "--hypothesis-profile", "unshrunk", "--tb", "no")  # fmt: skip
+PYTEST = (
+    "-m", "pytest", "-n", "0", "-p", "no:cacheprovider", "-m", SHORT, "--hypothesis-profile", "unshrunk", "--tb", "no",
+)  # fmt: skip
 LIMIT_S = 300
 
 

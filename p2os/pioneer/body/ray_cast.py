@@ -13,8 +13,6 @@ from p2os.pioneer.world.geometry import INFINITY, Footprint
 Direction = tuple[float, float]
 #: chosen: half the cone of a sonar; wider parts of a fan leave out fewer edges.
 NARROW_RAD = math.radians(15)
-#: A polygon of fewer edges is a line, which nothing is inside of.
-FEWEST_AROUND = 3
 
 
 class Echo(NamedTuple):
@@ -49,7 +47,7 @@ def cast(things: Iterable[Footprint], x: float, y: float, rays: Sequence[Directi
             _circle(thing, px, py, rays, hits)
             continue
         # From inside, no edge is seen from its outer side.
-        if not _edges(thing, x, y, rays, hits, is_inside=False) and len(thing.edges) >= FEWEST_AROUND:
+        if not _edges(thing, x, y, rays, hits, is_inside=False) and thing.contains(x, y):
             _edges(thing, x, y, rays, hits, is_inside=True)
     return hits
 
