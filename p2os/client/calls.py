@@ -222,20 +222,32 @@ class RobotCalls:
         turn_accel_radps2: float | None = None,
         turn_decel_radps2: float | None = None,
     ) -> None:
-        """Set the robot's own limits for this session (SETV, SETRV, SETA, SETRA); None leaves one as it is."""
+        """Set the robot's own limits for this session (SETV, SETRV, SETA, SETRA); None leaves one as it is.
+
+        Raises:
+            LinkLostError: no session is open.
+            UsageError: a limit is no positive number, or is 0 in the whole units of the wire; none is set.
+            LocalProtocolError: a limit is more than the wire carries; none is set.
+        """
         rows = (
             (CommandNumber.SETV, forward_mps, 1000.0), (CommandNumber.SETRV, turn_radps, math.degrees(1)),
             (CommandNumber.SETA, accel_mps2, 1000.0), (CommandNumber.SETA, decel_mps2, -1000.0),
             (CommandNumber.SETRA, turn_accel_radps2, math.degrees(1)),
             (CommandNumber.SETRA, turn_decel_radps2, -math.degrees(1)),
         )  # fmt: skip
+        commands = []
         for number, value, factor in rows:
             if value is None:
                 continue
             value = as_number(value, "set_limits", "SI units")  # noqa: PLW2901 - checked
             if not (math.isfinite(value) and value > 0):
                 raise UsageError(f"a limit of {value} is not positive")
-            self.send(number, round(value * factor))
+            argument = round(value * factor)
+            if not argument:
+                raise UsageError(f"a limit of {value} is 0 in whole {number.row.unit}, which is what the wire carries")
+            commands.append(Command(number, argument))
+        for command in commands:
+            self.send(command)
 
     def set_pose(self, x_m: float = 0.0, y_m: float = 0.0, heading_rad: float = 0.0) -> None:
         """Set where the robot is; states from now on count from there. Nothing is sent."""

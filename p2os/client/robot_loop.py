@@ -94,6 +94,8 @@ class RobotLoop:
                 self._is_closed = True
                 self.core.close(self._line.now())
                 self._turn()  # STOP is out before anything can interrupt
+            if self._loop is not None and not self._loop.is_running():
+                return  # a coroutine that has outlived its loop is thrown away: nobody can wait
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(CLOSING_S):
                     while not (self._line.is_over or self._is_finished) and self.failure is None:
@@ -110,7 +112,7 @@ class RobotLoop:
             was_finished, self._is_finished = self._is_finished, True
             if self._loop is not None and not self._loop.is_closed():
                 self._let_go_of_loop()
-            self._changed.set()
+                self._changed.set()  # in a loop that was closed nobody waits any more
             if not was_finished:
                 self._line.log_end()
 
@@ -160,7 +162,7 @@ class RobotLoop:
 
     def _arrange(self) -> None:
         loop = self._loop
-        if loop is None:
+        if loop is None or loop.is_closed():
             return
         transport, wait_s = self._line.transport, self._line.wait_s()
         descriptor = None

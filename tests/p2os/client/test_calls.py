@@ -94,6 +94,7 @@ def test_limits_are_set_in_the_robots_units_and_known_from_then_on(calls: Calls)
     assert calls.limits.forward_mps == 0.5
     assert calls.limits.turn_radps == pytest.approx(math.radians(57))
     assert calls.limits.decel_mps2 == 0.3
+    assert said_by(calls, lambda robot: robot.set_limits(accel_mps2=0.0006)) == [Command(C.SETA, 1)]
     calls.set_velocity(2.0, -9.0)
     calls.rig.living(0.2)
     assert Command(C.VEL, 500) in calls.rig.commands()
@@ -111,6 +112,10 @@ def test_limits_are_set_in_the_robots_units_and_known_from_then_on(calls: Calls)
         (lambda robot: robot.say([(1.0, 60)] * 21), "21 notes: SAY takes at most 20"),
         (lambda robot: robot.set_limits(forward_mps=0.0), "a limit of 0.0 is not positive"),
         (lambda robot: robot.set_limits(accel_mps2=math.inf), "not positive"),
+        (lambda robot: robot.set_limits(decel_mps2=0.0005), "a limit of 0.0005 is 0 in whole mm/s2"),
+        (lambda robot: robot.set_limits(turn_radps=0.5 / math.degrees(1)), "is 0 in whole deg/s, which"),
+        (lambda robot: robot.set_limits(forward_mps=0.5, turn_accel_radps2=-1.0), "a limit of -1.0 is not positive"),
+        (lambda robot: robot.set_limits(forward_mps=0.5, accel_mps2=99.0), "99000"),
         (lambda robot: robot.set_velocity(math.nan), "is no speed"),
     ],
 )

@@ -281,6 +281,33 @@ def test_an_asyncio_robot_whose_loop_has_ended_is_stopped(served: ServedRobot) -
     until(lambda: not served.pioneer.state.open)
 
 
+@pytest.mark.parametrize("is_thrown_away", [False, True], ids=["at-exit", "thrown-away"])
+def test_an_asyncio_robot_that_is_waited_for_in_a_loop_that_was_closed_is_stopped(
+    served: ServedRobot, *, is_thrown_away: bool
+) -> None:
+    recorder, robots = Recorder(), []
+
+    async def story() -> None:
+        async with AsyncRobot(served.url, settings=QUICK, opener=recorder) as robot:
+            robots.append(robot)
+            robot.set_velocity(0.3)
+            await robot.sleep(60.0)
+
+    loop, program = asyncio.new_event_loop(), story()
+    loop.create_task(program)  # the loop keeps those that wait
+    while not robots:
+        loop.run_until_complete(asyncio.sleep(0.1))
+    for task in asyncio.all_tasks(loop):
+        task._log_destroy_pending = False  # type: ignore[attr-defined]
+    loop.close()
+    if is_thrown_away:
+        program.close()
+    else:
+        robots[0]._runner.finish()
+    assert recorder.sent[-4:] == CLOSING_COMMANDS
+    until(lambda: not served.pioneer.state.open)
+
+
 def test_an_asyncio_robot_whose_loop_was_closed_without_a_word_is_stopped_with_the_program(
     served: ServedRobot,
 ) -> None:
