@@ -11,7 +11,7 @@ import codecs
 import errno
 import io
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from hashlib import sha256
 from os import fstat
@@ -244,6 +244,34 @@ def open_to_write(path: Path) -> BinaryIO:
 def open_to_write_text(path: Path, *, newline: str = "\n") -> TextIO:
     """Open a file of text in UTF-8, as `open_to_write` does."""
     return io.TextIOWrapper(open_to_write(path), encoding="utf-8", newline=newline)
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Yield where a file is to be written that takes the place of another only once it is whole.
+
+    It is written beside it, with `.part` after its name; what is no plain file (a link, a pipe) is written itself.
+
+    Raises:
+        OSError: It cannot be written; what was there is there.
+    """
+    if path.is_symlink() or (path.exists() and not path.is_file()):
+        yield path
+        return
+    part = path.with_name(f"{path.name}.part")
+    try:
+        yield part
+        part.replace(path)
+    except BaseException:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+        raise
+
+
+def replace_text(path: Path, text: str) -> None:
+    """Write a file of text in UTF-8, as `replacing` does."""
+    with replacing(path) as part:
+        part.write_text(text, encoding="utf-8")
 
 
 def writing_temporary() -> AbstractContextManager[None]:

@@ -27,7 +27,7 @@ from robot_bench.campaign.space import Space
 from robot_bench.campaign.variants.diversity import FailureSet
 from robot_bench.campaign.variants.mutation.interval import CONFIDENCE, share_interval
 from simbase.errors import MissingDependencyError
-from simbase.files import writing
+from simbase.files import replacing, writing
 from simbase.installation import installed_version
 
 RESULTS, FAILURES = "results", "failures"
@@ -154,9 +154,8 @@ class Results:
         names = list(dict.fromkeys(name for entry in entries for name in entry))
         schema = pa.schema([(name, types[self._type(name)]) for name in names])
         rows = [{name: self._cast(name, entry.get(name)) for name in names} for entry in entries]
-        scratch = path.with_suffix(".part")
-        parquet.write_table(pa.Table.from_pylist(rows, schema=schema), scratch)
-        scratch.replace(path)
+        with replacing(path) as part:
+            parquet.write_table(pa.Table.from_pylist(rows, schema=schema), part)
 
     def _type(self, name: str) -> str:
         """Return what a column holds."""

@@ -17,6 +17,7 @@ from robot_bench.events.kinds import Wave
 from robot_bench.recording.disputed import body_note
 from robot_bench.recording.run_folder import SUMMARY_NAME
 from robot_bench.recording.run_record import RunRecord
+from simbase.files import replace_text
 from simbase.timing import NS_PER_S
 
 #: Side of the cells that a run's coverage is counted in, metres.
@@ -151,7 +152,7 @@ def outcome_of_all(scenario: str, robots: Mapping[str, Json]) -> Json:
 def write_outcome(record: RunRecord, folder: Path) -> Json:
     """Write `summary.json` and return what it holds."""
     outcome = outcome_of(record)
-    (folder / SUMMARY_NAME).write_text(json.dumps(outcome, indent=2, sort_keys=True) + "\n", encoding="utf-8")
+    replace_text(folder / SUMMARY_NAME, json.dumps(outcome, indent=2, sort_keys=True) + "\n")
     return outcome
 
 

@@ -26,6 +26,7 @@ from p2os.errors import RunFailedError
 from robot_bench.events.codec import TRACE, Recorded, line_of
 from robot_bench.events.kinds import Verdict
 from simbase.errors import FileError
+from simbase.files import reading, writing
 from simbase.state import PartState, Stateful
 from simbase.timing import NS_PER_S, Nanos
 
@@ -73,10 +74,8 @@ class TraceWriter(Stateful):
         #: Events taken whose lines were not made yet: many in one go cost less than a few at a time.
         self._unspelled: list[Recorded] = []
         if path is not None:
-            try:
+            with writing(path):
                 self._file = path.open("r+" if goes_on else "w", encoding="ascii", newline="\n")
-            except OSError as error:
-                raise FileError(f"cannot write {path}: {error.strerror}") from error
         self._hash = EMPTY_HASH
         self._flushed_second = -1
         #: Why nothing can be written any more.
@@ -161,12 +160,9 @@ class TraceWriter(Stateful):
             self._file.seek(begin)
             yield from io.StringIO(self._file.read())
             return
-        try:
-            with self.path.open(encoding="utf-8", errors="replace") as lines:
-                lines.seek(begin)
-                yield from lines
-        except OSError as error:
-            raise FileError(f"cannot read {self.path}: {error.strerror}") from error
+        with reading(self.path), self.path.open(encoding="utf-8", errors="replace") as lines:
+            lines.seek(begin)
+            yield from lines
 
     def copy_to(self, path: Path) -> int:
         """Write all that was written so far to a file, for a writer that goes on there; return its length.
@@ -176,13 +172,11 @@ class TraceWriter(Stateful):
             FileError: The one cannot be read, or the other not written.
         """
         self.flush()
-        try:
+        with writing(path):
             if self.path is None:
                 path.write_text(self.text, encoding="ascii", newline="\n")
             else:
                 shutil.copyfile(self.path, path)
-        except OSError as error:
-            raise FileError(f"cannot write {path}: {error.strerror}") from error
         return self.length
 
     def flush(self) -> None:

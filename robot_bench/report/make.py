@@ -32,7 +32,7 @@ from robot_bench.report.drawn import drawn_of
 from robot_bench.report.page_of_all import REPORT_NAME, write_report_of_all
 from robot_bench.report.run_page import run_report
 from robot_bench.view.kept_recording import is_long, keep
-from simbase.files import writing
+from simbase.files import replace_text, replacing, writing
 
 
 class Files(IntEnum):
@@ -83,7 +83,7 @@ def _plots() -> ModuleType | None:
 def _report_of(record: RunRecord, folder: Path, files: Files) -> ReportFiles:
     page = folder / REPORT_NAME
     recording = run_report(record)
-    page.write_text(page_of(recording, all_is_in=TRACE_NAME), encoding="utf-8")
+    replace_text(page, page_of(recording, all_is_in=TRACE_NAME))
     if is_long(folder):
         keep(recording, folder)
     plots = _plots() if files >= Files.PLOTS else None
@@ -118,10 +118,11 @@ def _artefacts_of(record: RunRecord, folder: Path, files: Files) -> Artefacts:
         outcome = write_outcome(record, folder)
         if files < Files.REPORT:
             return Artefacts(outcome=outcome, report=folder / TRACE_NAME)
-        write_vcd(record, folder / "pins.vcd")
-        write_sigrok(record, folder / "pins.sr")
-        write_wire(record, folder / "wire.jsonl")
-        (folder / "usart.txt").write_bytes(b"".join(data for _, data in record.usart))
+        for name, write in (("pins.vcd", write_vcd), ("pins.sr", write_sigrok), ("wire.jsonl", write_wire)):
+            with replacing(folder / name) as part:
+                write(record, part)
+        with replacing(folder / "usart.txt") as part:
+            part.write_bytes(b"".join(data for _, data in record.usart))
         report = _report_of(record, folder, files)
     return Artefacts(outcome=outcome, report=report.page)
 

@@ -18,7 +18,7 @@ from robot_bench.recording.run_folder import SUMMARY_NAME, TRACE_NAME
 from robot_bench.recording.run_record import RunRecord
 from robot_bench.recording.summary import verdict_of
 from robot_bench.view.run_recording import recording_of_all, standing_of
-from simbase.files import writing
+from simbase.files import replace_text, writing
 
 REPORT_NAME = "report.html"
 _HEAD = ("robot", "way", "clear of", "collisions", "what came of it")
@@ -37,8 +37,8 @@ def write_report_of_all(outcome: Json, records: Mapping[str, RunRecord], folder:
     """
     page = page_of(report_of_all(outcome, records), all_is_in=f"each robot's {TRACE_NAME}")
     with writing(folder):
-        (folder / REPORT_NAME).write_text(page, encoding="utf-8")
-        (folder / SUMMARY_NAME).write_text(json.dumps(outcome, indent=2, sort_keys=True) + "\n", encoding="utf-8")
+        replace_text(folder / REPORT_NAME, page)
+        replace_text(folder / SUMMARY_NAME, json.dumps(outcome, indent=2, sort_keys=True) + "\n")
 
 
 def report_of_all(outcome: Json, records: Mapping[str, RunRecord]) -> ViewRecording:

@@ -16,6 +16,7 @@ from matplotlib.transforms import Affine2D
 
 from robot_bench.events.codec import Json
 from robot_bench.report.plan import things_at_the_end
+from simbase.files import replacing
 
 LEFT, RIGHT, WALL, BOX, FLOOR, HIT = "#1b6ca8", "#c8553d", "#4a5560", "#b9a66b", "#dfe3d8", "#b00020"
 LABEL_COLOURS = {"hit": HIT, "time": LEFT, "start": LEFT, "thing": "#1d2327"}
@@ -56,7 +57,8 @@ def write_scene(data: Json, path: Path) -> None:
 
 def _paint(figure: Figure, path: Path) -> None:
     FigureCanvasAgg(figure)
-    figure.savefig(path, dpi=DOTS_PER_INCH, metadata={"Software": None})
+    with replacing(path) as part:
+        figure.savefig(part, format="png", dpi=DOTS_PER_INCH, metadata={"Software": None})
 
 
 def _path_figure(data: Any) -> Figure:

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from simbase.errors import FileError, P2osError
-from simbase.files import lines_of, open_to_write, open_to_write_text, read_bytes, read_text, write_text
+from simbase.files import lines_of, open_to_write, open_to_write_text, read_bytes, read_text, replacing, write_text
 from tests.test_architecture import module_name, sources
 
 READERS: dict[str, Callable[[Path, int], object]] = {
@@ -184,6 +184,54 @@ def test_a_file_that_is_written_for_long_tells_of_a_full_disk_whenever_it_meets_
     text.write("a line\n")
     with pytest.raises(FileError, match="cannot write /dev/full"):
         text.close()
+
+
+@pytest.mark.parametrize("kind", [OSError, KeyboardInterrupt, None])
+@pytest.mark.parametrize("was_there", [True, False])
+def test_a_file_takes_the_place_of_another_only_once_it_is_whole(
+    tmp_path: Path, kind: type[BaseException] | None, *, was_there: bool
+) -> None:
+    path = tmp_path / "a.txt"
+    if was_there:
+        path.write_text("old", encoding="utf-8")
+
+    def write() -> None:
+        with replacing(path) as part:
+            part.write_text("ne", encoding="utf-8")
+            assert path.exists() is was_there
+            if kind is not None:
+                raise kind
+            part.write_text("new", encoding="utf-8")
+
+    if kind is None:
+        write()
+    else:
+        with pytest.raises(kind):
+            write()
+    kept = {"a.txt": "old"} if was_there else {}
+    assert {each.name: each.read_text() for each in tmp_path.iterdir()} == (kept if kind else {"a.txt": "new"})
+
+
+def test_what_is_no_plain_file_is_written_itself(tmp_path: Path) -> None:
+    link, file = tmp_path / "link", tmp_path / "file"
+    link.symlink_to(file)
+    with replacing(link) as part:
+        part.write_text("new", encoding="utf-8")
+    assert link.is_symlink()
+    assert file.read_text() == "new"
+    with replacing(Path("/dev/null")) as part:
+        assert part == Path("/dev/null")
+
+
+@pytest.mark.parametrize("kind", [OSError, KeyboardInterrupt])
+def test_a_part_that_cannot_be_removed_hides_no_error(tmp_path: Path, kind: type[BaseException]) -> None:
+    def fail(path: Path) -> None:
+        with replacing(path) as part:
+            part.mkdir()
+            raise kind("why")
+
+    with pytest.raises(kind, match="why"):
+        fail(tmp_path / "a")
 
 
 @pytest.mark.parametrize(

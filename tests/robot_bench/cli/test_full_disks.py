@@ -139,8 +139,13 @@ def refused(done: subprocess.CompletedProcess[str]) -> None:
 
 
 @pytest.mark.parametrize(("verb", "size"), ROWS)
-def test_no_room_is_reported_in_one_line_with_the_file(verb: str, size: int, place: Path) -> None:
+def test_no_room_is_reported_in_one_line_with_the_file_and_what_a_run_has_is_kept(
+    verb: str, size: int, place: Path
+) -> None:
+    before = {path: path.read_bytes() for path in (place / "c").iterdir()}
     refused(child(place, size, verb))
+    assert {path: path.read_bytes() for path in before} == before
+    assert not list(place.rglob("*.part"))
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """The trace is sorted, canonical, hashed, and readable after the process was killed."""
 
+import errno
 import hashlib
 import json
 import os
@@ -71,8 +72,24 @@ def test_lines_are_made_a_second_at_a_time_and_for_whoever_asks(tmp_path: Path) 
 
 
 def test_a_trace_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
-    with pytest.raises(FileError, match=r"cannot write .*No such file or directory"):
+    with pytest.raises(FileError, match=r"cannot write .*no such file or directory"):
         TraceWriter(tmp_path / "nowhere" / "trace.jsonl")
+
+
+def test_a_trace_that_cannot_be_read_again_is_one_line_with_a_hint(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    trace = TraceWriter(tmp_path / "t")
+
+    def fail(*_: object, **__: object) -> None:
+        raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+    monkeypatch.setattr(Path, "open", fail)
+    with pytest.raises(FileError, match=r"cannot read .*input/output error") as found:
+        next(trace.lines())
+    assert found.value.hint == "is the disk sound, and the terminal still there?"
+    monkeypatch.undo()
+    trace.close()
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full")

@@ -1,6 +1,8 @@
 """Reports are made from a trace alone, whole or cut at any byte."""
 
+import errno
 import json
+import os
 from pathlib import Path
 from typing import cast
 
@@ -25,6 +27,7 @@ from robot_bench.report.make import Files, make_artefacts
 from robot_bench.report.page_of_all import report_of_all
 from robot_bench.report.run_page import render_run
 from robot_bench.view.run_recording import recording_of_all
+from simbase.errors import FileError
 from tests.p2os.view.pages import ReadPage
 
 
@@ -76,6 +79,32 @@ def run(tmp_path: Path) -> Path:
     lines = [json.dumps(entry) + "\n" for entry in entries()]
     (tmp_path / "trace.jsonl").write_text("".join(lines), encoding="utf-8")
     return tmp_path
+
+
+def test_each_file_that_is_made_of_a_run_takes_the_old_one_s_place_once_it_is_whole(
+    run: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make_artefacts(run)
+    files = [path for path in run.iterdir() if path.name != "trace.jsonl"]
+    assert len(files) == 6
+    replace, calls = Path.replace, 0
+
+    def full(part: Path, path: Path) -> Path:
+        nonlocal calls
+        calls += 1
+        if calls > done:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return replace(part, path)
+
+    monkeypatch.setattr(Path, "replace", full)
+    for done in range(len(files)):
+        for path in files:
+            path.write_bytes(b"old")
+        calls = 0
+        with pytest.raises(FileError, match="no space left"):
+            make_artefacts(run)
+        assert sum(path.read_bytes() != b"old" for path in files) == done
+        assert len(list(run.iterdir())) == len(files) + 1
 
 
 def test_a_whole_run_is_read_back(run: Path) -> None:

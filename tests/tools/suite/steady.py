@@ -3,7 +3,8 @@
     make steady                      twenty times, eight processes beside it that never wait
     make steady STEADY="--times 3 tests/p2os/client"
 
-Prints each test that has failed, with how often; exit code 1 where one has. None of them is left out for it.
+Prints after each round what has failed and why, and at the end each of them with how often; exit code 1 where one has.
+None of them is left out for it.
 """
 
 import argparse
@@ -16,7 +17,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[3]
 BUSY = "while True: pass"
-FAILED = re.compile(r"^(?:FAILED|ERROR) (\S+)", re.MULTILINE)
+FAILED = re.compile(r"^(?:FAILED|ERROR) (\S+).*$", re.MULTILINE)
 
 
 def main() -> int:
@@ -43,10 +44,11 @@ def main() -> int:
             held.callback(busy.kill)
         for number in range(1, words.times + 1):
             done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-            names = FAILED.findall(done.stdout)
-            failed.update(names)
+            found = list(FAILED.finditer(done.stdout))
+            failed.update(each[1] for each in found)
             came_to = done.stdout.strip().splitlines()[-1] if done.stdout.strip() else done.stderr.strip()
-            sys.stdout.write("\n  ".join((f"{number} of {words.times}: {came_to}", *names)) + "\n")
+            reasons = "".join(f"  {each[0]}\n" for each in found)
+            sys.stdout.write(f"{number} of {words.times}: {came_to}\n{reasons}")
             sys.stdout.flush()
             if done.returncode not in (0, 1):
                 return 1
