@@ -393,7 +393,7 @@ def test_a_robot_on_its_way_shows_where_it_is_and_an_interruption_says_that_it_s
         driver.process.send_signal(signal.SIGINT)
         shown += seen_until(driver, "let go")
         assert driver.end()[0] == 130
-        assert STOP in robot.numbers
+        robot.until(lambda: STOP in robot.numbers, "STOP")
     assert "driving 3.000 m: 0." in shown
     assert "\nthe robot was stopped and let go" in shown.replace("\r", "")
     assert "interrupted" not in shown.partition("let go")[0], "the last line says it"

@@ -181,7 +181,7 @@ def test_many_signals_do_not_cut_the_stopping_short(robot: RecordingRobot, drive
         drivers[0].process.send_signal(number)
         time.sleep(0.002)
     assert drivers[0].end()[0] == 130
-    assert robot.numbers[-1] == CLOSE
+    robot.until(lambda: robot.numbers[-1] == CLOSE, "CLOSE")
     assert STOP in robot.numbers
 
 

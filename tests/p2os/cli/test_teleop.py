@@ -227,7 +227,7 @@ def test_a_person_drives_lets_go_and_leaves(served: object) -> None:
     terminal.wait_for("stand")
     terminal.press("q")
     assert terminal.end() == 0
-    assert "motors: off" in served.text
+    until(lambda: "motors: off" in served.text)
 
 
 def test_ctrl_c_stops_the_robot_first(served: object) -> None:
@@ -238,7 +238,7 @@ def test_ctrl_c_stops_the_robot_first(served: object) -> None:
     until(lambda: "motors: on" in served.text)  # a packet may step over any one place
     terminal.process.send_signal(signal.SIGINT)
     assert terminal.end() == 130
-    assert "motors: off" in served.text
+    until(lambda: "motors: off" in served.text)
 
 
 def test_a_speed_above_the_robots_own_is_said_and_the_one_it_takes_is_shown(served: object) -> None:
