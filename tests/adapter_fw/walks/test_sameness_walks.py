@@ -86,12 +86,16 @@ GIVEN: Mapping[str, Callable[[random.Random], tuple[object, ...]]] = {
     ),
     "drive by pad": lambda draw: (draw.choice((0, 41, 500, 1023)), draw.choice((-512, 0, 300))),
     "master": lambda draw: (draw.choice(tuple(Master)),),
+    "late": lambda draw: (
+        draw.choice(("sip", "sip", "sip", "answer", "pad", "pad", "pad", "master", "shutdown")),
+        draw.choice((0, 1, 1, 2)),
+    ),
     "rare": lambda draw: (draw.choice(("shutdown", "reset", "restore", "half frame")),),
 }
 #: What keeps a session going comes often, what ends it seldom.
 KINDS = (
     *("motors", "motors", "sips", "sips", "sip", "obey", "obey", "pwm", "noise", "damaged", "frame", "pin", "glitch"),
-    *("time", "time", "connect", "connect", "pad", "drive by pad", "master", "rare"),
+    *("late", "late", "time", "time", "connect", "connect", "pad", "drive by pad", "master", "rare"),
 )
 
 
