@@ -20,6 +20,10 @@ from tests.tools.suite.approved import judge_alike, judge_of
 PROGRAMS, SLICES = 30, 40
 #: Programs of which it is counted, too, what C leaves to Python.
 COUNTED = range(0, PROGRAMS, 2)
+#: What C calls Python for where the numbers matter: an access, a trap, an event, each at its time.
+_NOTED = frozenset({
+    "read", "write", "trapped", "bad_access", "write_at_once", "unknown_block", "event", "bus", "code_written",
+})  # fmt: skip
 #: Time between two looks, ns.
 SPANS_NS = (1, 125, 1_000, 4_000, 20_000, 60_000)
 #: The cores that go from block to block, and so show the same.
@@ -121,10 +125,19 @@ def _asked(core: str, _: random.Random) -> Iterator[str]:
     """Yield how often C calls Python, by what for, while programs run; rows of blocks, and the last access at its time.
 
     What it can answer itself it does; of a loop that waits it writes the last rows alone, however long it goes round.
+    Of accesses and traps it is noted which they are, when, and by which instruction.
     """
-    counts = Counter[str]()
-    with counted_calls(counts):
+    counts, notes = Counter[str](), list[str]()
+
+    def note(name: str, arguments: tuple[int, ...]) -> None:
+        if name in _NOTED:
+            shared = board.chip.processor.shared
+            at = f"{shared.access_cycle}/{shared.access_pc:x}" if shared.in_access else shared.cycle
+            notes.append(f"{name} {' '.join(f'{each or 0:x}' for each in arguments)} @{at}")
+
+    with counted_calls(counts, note):
         board = _board(core)
+    notes.clear()
     fresh = board.snapshot()
     assert isinstance(board.chip.engine, NativeEngine)
     for number in COUNTED:
@@ -133,8 +146,9 @@ def _asked(core: str, _: random.Random) -> Iterator[str]:
         for _line in _lines(board, number, *_image()[1][number], is_exact=core == "exact"):
             shared = board.chip.engine.shared
             accesses = f"{shared.access_cycle} {shared.access_pc:x} {shared.exact_stops}"
-            lines.append(f"{shared.logged} {accesses} {sorted(counts.items())}")
+            lines.append(f"{shared.logged} {accesses} {sorted(counts.items())} {notes}")
             counts.clear()
+            notes.clear()
         yield "\n".join(lines)
 
 

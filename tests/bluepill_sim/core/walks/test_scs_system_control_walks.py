@@ -15,7 +15,7 @@ from bluepill_sim.extension.layout import SHARED
 from tests.bluepill_sim.machine import Machine
 from tests.tools.suite.approved import judge_of
 
-STEPS = 900
+STEPS = 1100
 #: Where there is a register, or none: from, up to.
 RANGES = (
     (0xE000_0000, 0xE000_0090), (0xE000_0DFC, 0xE000_0E48), (0xE000_0E7C, 0xE000_0E88), (0xE000_0FA8, 0xE000_1068),
@@ -44,7 +44,8 @@ _KEYS = (
     (_AIRCR, 0x05FA_0702), (_AIRCR, 0x05FA_0000), (_AIRCR, 0x1234_0700), (_TCR, 1), (_TER, 0xFFFF_FFFF),
     (0xE000_E010, 7), (0xE000_E010, 3), (0xE000_E014, 99), (0xE000_E014, 0), (0xE000_E018, 5),
     (0xE000_1000, 1), (0xE000_2000, 3), (0xE000_2000, 1), (0xE000_E100, 0xFFFF_FFFF), (0xE000_EF00, 42),
-    (0xE000_EF00, 43), (0xE000_EF00, 0x22A),
+    (0xE000_EF00, 43), (0xE000_EF00, 0x22A), (0xE000_E280, 0xFFFF_FFFF), (0xE000_E284, 0xFFFF_FFFF),
+    (0xE000_E280, 0xFFFF_FFFF), (0xE000_E200, 0x8000_0003), (0xE000_E204, 0x401), (0xE000_E180, 0x8000_0001),
 )  # fmt: skip
 
 
