@@ -5,10 +5,12 @@ import zlib
 from collections import Counter
 from collections.abc import Iterator
 from functools import cache, partial
+from unittest.mock import patch
 
 from bluepill_sim import BluePill
 from bluepill_sim.core import Reg
 from bluepill_sim.core.unicorn_core import GENERAL
+from bluepill_sim.extension.layout import SHARED
 from bluepill_sim.extension.library import core_chosen
 from bluepill_sim.native.engine import NativeEngine
 from bluepill_sim.program.image import Image
@@ -34,17 +36,19 @@ _SYSTEM = (
     "exception_number", "sleep", "event_register", "vector_table", "scr", "ccr", "shcsr", "cfsr", "hfsr", "mmfar",
     "bfar", "is_locked_up", "last_sleep_cycle", "bus_error_cycle", "bus_error_pc", "bus_error_address",
 )  # fmt: skip
+#: What the host decides, or is shown itself.
+_OF_THE_HOST = frozenset({"sram", "flash", "scratch", "fault", "last"})
 _NVIC = ("pending", "active", "enabled", "levels", "priority_grouping")
 
 
 @cache
-def _image() -> tuple[Image, list[tuple[int, int]]]:
-    return assembled(PROGRAMS, "bg")
+def _image(*, makes_accesses: bool = False) -> tuple[Image, list[tuple[int, int]]]:
+    return assembled(PROGRAMS, "accesses" if makes_accesses else "bg", makes_accesses=makes_accesses)
 
 
-def _board(core: str) -> BluePill:
+def _board(core: str, *, makes_accesses: bool = False) -> BluePill:
     with core_chosen(core):
-        return BluePill(_image()[0])
+        return BluePill(_image(makes_accesses=makes_accesses)[0])
 
 
 def _request(board: BluePill, line: int, *, stays: bool) -> None:
@@ -54,6 +58,21 @@ def _request(board: BluePill, line: int, *, stays: bool) -> None:
     nvic.set_level(line, True)
     board.chip.processor.pending_changed()
     nvic.set_level(line, stays)
+
+
+def _raise(board: BluePill, lines: list[int]) -> None:
+    """Have devices raise interrupts at once, and take them back."""
+    board.chip.processor.nvic.enabled |= sum(1 << line for line in lines)
+    for level in (True, False):
+        for line in lines:
+            board.chip.fabric.set_line(line, level)
+
+
+def _shared(board: BluePill) -> str:
+    """Return a checksum of all that C keeps of the core, but addresses of the host."""
+    shared = board.chip.processor.shared
+    values = (getattr(shared, one.name) for one in SHARED.fields if one.name not in _OF_THE_HOST)
+    return f"{zlib.crc32(str([each if isinstance(each, int) else bytes(each) for each in values]).encode()):x}"
 
 
 def _shown(board: BluePill) -> str:
@@ -105,6 +124,8 @@ def _lines(board: BluePill, number: int, base: int, stop: int, *, is_exact: bool
         board.pin("PA0").drive(bool(turn % 2))
         if dice.random() < 0.15:
             _request(board, dice.choice((1, 5, 47, 48, 59)), stays=number > 0 and dice.random() < 0.1)
+        if dice.random() < 0.1:
+            _raise(board, dice.sample((0, 6, 11, 31, 42), dice.randrange(1, 4)))
         if turn == SLICES // 3:
             saved = board.snapshot()
             board.advance_to(board.now_ns + 2_000)
@@ -121,13 +142,17 @@ def _lines(board: BluePill, number: int, base: int, stop: int, *, is_exact: bool
     yield f"{rows} {edges} {[str(warning) for warning in board.warnings]} {board.fault!r}"
 
 
-def _asked(core: str, _: random.Random) -> Iterator[str]:
+def _asked(core: str, _: random.Random, *, makes_accesses: bool = False) -> Iterator[str]:
     """Yield how often C calls Python, by what for, while programs run; rows of blocks, and the last access at its time.
 
     What it can answer itself it does; of a loop that waits it writes the last rows alone, however long it goes round.
-    Of accesses and traps it is noted which they are, when, and by which instruction.
+    Of accesses and traps it is noted which they are, when, and by which instruction; and how often a run came back.
     """
-    counts, notes = Counter[str](), list[str]()
+    counts, notes, go_on = Counter[str](), list[str](), NativeEngine.go_on
+
+    def run(engine: NativeEngine, limit: int) -> object:
+        counts["run"] += 1
+        return go_on(engine, limit)
 
     def note(name: str, arguments: tuple[int, ...]) -> None:
         if name in _NOTED:
@@ -136,24 +161,28 @@ def _asked(core: str, _: random.Random) -> Iterator[str]:
             notes.append(f"{name} {' '.join(f'{each or 0:x}' for each in arguments)} @{at}")
 
     with counted_calls(counts, note):
-        board = _board(core)
+        board = _board(core, makes_accesses=makes_accesses)
     notes.clear()
     fresh = board.snapshot()
     assert isinstance(board.chip.engine, NativeEngine)
-    for number in COUNTED:
-        board.restore(fresh)
-        lines = [f"program {number}"]
-        for _line in _lines(board, number, *_image()[1][number], is_exact=core == "exact"):
-            shared = board.chip.engine.shared
-            accesses = f"{shared.access_cycle} {shared.access_pc:x} {shared.exact_stops}"
-            lines.append(f"{shared.logged} {accesses} {sorted(counts.items())} {notes}")
-            counts.clear()
-            notes.clear()
-        yield "\n".join(lines)
+    with patch.object(NativeEngine, "go_on", run):
+        for number in COUNTED:
+            board.restore(fresh)
+            lines = [f"program {number}"]
+            place = _image(makes_accesses=makes_accesses)[1][number]
+            for line in _lines(board, number, *place, is_exact=core == "exact"):
+                shared = board.chip.engine.shared
+                accesses = f"{shared.access_cycle} {shared.access_pc:x} {shared.exact_stops}"
+                shown = f"{zlib.crc32(line.encode()):x} {_shared(board)}"
+                lines.append(f"{shown} {shared.logged} {accesses} {sorted(counts.items())} {notes}")
+                counts.clear()
+                notes.clear()
+            yield "\n".join(lines)
 
 
 TRACES = {core: partial(_episodes, core) for core in (*CORES, "exact")} | {
-    f"{core} asked": partial(_asked, core) for core in ("native", "own")
-}
+    f"{core} {name}": partial(_asked, core, makes_accesses=name == "accesses")
+    for core in ("native", "own") for name in ("asked", "accesses")
+}  # fmt: skip
 test_a_walk_shows_what_was_approved = judge_of(__file__, TRACES)
 test_cores_that_go_from_block_to_block_show_the_same = judge_alike(__file__, CORES)
