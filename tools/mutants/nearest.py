@@ -53,6 +53,40 @@ TESTS_OF_C = {
         "tests/bluepill_sim/fabric/test_ahead.py", "tests/bluepill_sim/core/walks/test_program_walks.py",
         "tests/bluepill_sim/fabric/walks", "tests/bluepill_sim/peripherals/buses/test_bits_on_pins.py",
         "tests/bluepill_sim/fabric"),
+    "bluepill_sim/extension/source/core/access.c": (
+        "tests/bluepill_sim/core/walks/test_program_walks.py",
+        "tests/bluepill_sim/walks/test_native_registers_walks.py",
+        *(f"tests/bluepill_sim/native/test_native_{name}.py"
+          for name in ("registers", "ambiguous", "warned", "system", "random_registers", "core", "polling")),
+        *(f"tests/bluepill_sim/core/test_{name}.py" for name in ("forced_bits", "core_parts", "imprecise_faults")),
+        "tests/bluepill_sim/core/walks", "tests/bluepill_sim/peripherals/walks/test_gpio_afio_exti_crc_walks.py",
+        "tests/bluepill_sim/native"),
+    "bluepill_sim/extension/source/core/host.c": (
+        *(f"tests/bluepill_sim/peripherals/walks/test_{name}_walks.py" for name in ("adc_dma", "usart", "spi_i2c")),
+        "tests/bluepill_sim/core/walks/test_program_walks.py", "tests/bluepill_sim/native/test_native_dma.py",
+        "tests/bluepill_sim/peripherals/dma", "tests/bluepill_sim/native/test_bus_device.py",
+        *(f"tests/bluepill_sim/core/test_{name}.py" for name in ("sleep", "late_arrival", "time")),
+        *(f"tests/bluepill_sim/native/test_native_{name}.py" for name in ("core", "timers", "polling"))),
+    "bluepill_sim/extension/source/core/run.c": (
+        *(f"tests/bluepill_sim/core/walks/test_{name}_walks.py"
+          for name in ("program", "faults", "points", "counting_loops")),
+        *(f"tests/bluepill_sim/core/interpreter/test_{name}.py"
+          for name in ("exact", "own_core", "continued", "chaining")),
+        *(f"tests/bluepill_sim/core/test_{name}.py"
+          for name in ("sleep", "time", "late_arrival", "debug_halts", "exceptions")),
+        *(f"tests/bluepill_sim/native/test_native_{name}.py" for name in ("core", "polling", "system"))),
+    "bluepill_sim/extension/source/core/exceptions.c": (
+        *(f"tests/bluepill_sim/core/walks/test_{name}_walks.py" for name in ("program", "faults", "points")),
+        *(f"tests/bluepill_sim/core/interpreter/test_{name}.py" for name in ("continued", "exact")),
+        *(f"tests/bluepill_sim/core/test_{name}.py"
+          for name in ("late_arrival", "masks", "stacks", "sleep", "imprecise_faults", "faults", "time", "traps")),
+        *(f"tests/bluepill_sim/native/test_native_{name}.py" for name in ("system", "core"))),
+    # What counts in cycles, and what counts in ticks of a timer.
+    "bluepill_sim/extension/source/fabric/ramp.c": (
+        *(f"tests/bluepill_sim/core/walks/test_{name}_walks.py"
+          for name in ("scs_system_control", "program", "counting_loops")),
+        "tests/bluepill_sim/peripherals/walks/test_tim_walks.py", "tests/bluepill_sim/test_timers.py",
+        "tests/bluepill_sim/peripherals/tim", "tests/bluepill_sim/core/test_time.py", "tests/bluepill_sim/fabric"),
     "bluepill_sim/extension/source/core/blocks.c": (
         "tests/bluepill_sim/core/walks/test_program_walks.py", "tests/bluepill_sim/core/interpreter/test_heap.py",
         *(f"tests/bluepill_sim/core/interpreter/test_{name}.py"
@@ -70,7 +104,8 @@ TESTS_OF_C = {
     "bluepill_sim/extension/source/interpreter": (
         "tests/bluepill_sim/core/walks/test_program_walks.py",
         *(f"tests/bluepill_sim/core/interpreter/test_{name}.py"
-          for name in ("tidy", "memory_bounds", "against_unicorn", "blocks_decode", "special", "own_core", "exact")),
+          for name in ("tidy", "memory_bounds", "hooks", "blocks_decode", "special", "continued", "against_unicorn",
+                       "exact", "own_core")),
         "tests/bluepill_sim/core/interpreter/test_heap.py",
         "tests/bluepill_sim/core/interpreter", "tests/bluepill_sim/core/test_kernels.py",
         "tests/bluepill_sim/core/test_flag_vectors.py", "tests/bluepill_sim/native/test_native_core.py",
@@ -86,7 +121,8 @@ TESTS_OF_C = {
         "tests/bluepill_sim/board/test_resets.py", "tests/bluepill_sim/core", "tests/bluepill_sim/native",
         "tests/bluepill_sim/peripherals/walks/test_adc_dma_walks.py"),
     "bluepill_sim/extension/source/fabric": (
-        "tests/bluepill_sim/fabric/walks", "tests/bluepill_sim/fabric",
+        "tests/bluepill_sim/fabric/walks", "tests/bluepill_sim/core/walks/test_program_walks.py",
+        "tests/bluepill_sim/fabric",
         *(f"tests/bluepill_sim/peripherals/walks/test_{name}_walks.py" for name in ("tim", "spi_i2c")),
         "tests/bluepill_sim/test_timers.py", "tests/bluepill_sim/peripherals/tim/test_tim.py",
         "tests/bluepill_sim/core/test_core_parts.py", "tests/bluepill_sim/native"),
