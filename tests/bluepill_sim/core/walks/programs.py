@@ -164,6 +164,7 @@ class ProgramWriter:
             f"fault: {_FAULT}svc_handler: {_NOTE}movs r0, #0\nmsr control, r0\nbx lr\n"
             f"irq: {_INTERRUPT}{other}bx lr\nsystick: {_NOTE}mov32 r1, #{NOTES + 8}\nldr r2, [r1, #0]\nadds r2, #1\n"
             f"str r2, [r1, #0]\nbx lr\npendsv: push {{r4, lr}}\n{_NOTE}{self.peripheral()}pop {{r4, pc}}\n"
+            "room: nop\n"
         )  # fmt: skip
 
     def _label(self) -> str:
@@ -423,15 +424,16 @@ class ProgramWriter:
         )
 
     def flash_write(self) -> str:
-        """Program halfwords of the flash, with waiting and without; some of them twice, or locked."""
+        """Program halfwords behind the program or elsewhere, with waiting and without; some twice, or locked."""
         lines = (
             "mov32 r1, #0x40022000\nmov32 r0, #0x45670123\nstr r0, [r1, #4]\nmov32 r0, #0xCDEF89AB\nstr r0, [r1, #4]\n"
         )
         lines += f"movs r0, #{self._dice.choice((1, 1, 1, 0))}\nstr r0, [r1, #16]\n"
         for _ in range(self._dice.randrange(1, 3)):
             name, wait = self._dice.choice(("strh", "strh", "str", "strb")), self._label()
+            place = self._dice.choice((FLASH + 0x1FF10, "room"))
             lines += (
-                f"mov32 r3, #{FLASH + self._dice.choice((0xFF10, 0x1FF10)) + 4 * self._dice.randrange(4)}\n"
+                f"mov32 r3, #{place}\nadds r3, #{2 + 2 * self._dice.randrange(4)}\n"
                 f"movs r0, #{self._dice.randrange(256)}\n{name} r0, [r3, #0]\n"
             )
             if self._dice.randrange(3):
