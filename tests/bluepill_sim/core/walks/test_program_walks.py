@@ -3,7 +3,7 @@
 import random
 import zlib
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from functools import cache, partial
 from unittest.mock import patch
 
@@ -28,8 +28,6 @@ _NOTED = frozenset({
 })  # fmt: skip
 #: Time between two looks, ns.
 SPANS_NS = (1, 125, 1_000, 4_000, 20_000, 60_000)
-#: And where programs make accesses alone: flash takes 52.5 us to program.
-LONG_SPANS_NS = (125, 4_000, 60_000, 200_000)
 #: The cores that go from block to block, and so show the same.
 CORES = ("native", "python", "own")
 _SPECIAL = (Reg.XPSR, Reg.CONTROL, Reg.MSP, Reg.PSP, Reg.PRIMASK, Reg.BASEPRI, Reg.FAULTMASK)
@@ -107,9 +105,7 @@ def _episodes(core: str, _: random.Random) -> Iterator[str]:
         yield "\n".join([f"program {number}", *_lines(board, number, base, stop, is_exact=core == "exact")])
 
 
-def _lines(
-    board: BluePill, number: int, base: int, stop: int, *, is_exact: bool, spans_ns: Sequence[int] = SPANS_NS
-) -> Iterator[str]:
+def _lines(board: BluePill, number: int, base: int, stop: int, *, is_exact: bool) -> Iterator[str]:
     """Yield what a program shows from time to time; some are watched, recorded, saved and restored."""
     dice, chip = random.Random(f"slices {number}"), board.chip
     edges: list[tuple[str, str, int]] = []
@@ -134,7 +130,7 @@ def _lines(
             saved = board.snapshot()
             board.advance_to(board.now_ns + 2_000)
             board.restore(saved)
-        board.advance_to(board.now_ns + dice.choice(spans_ns))
+        board.advance_to(board.now_ns + dice.choice(SPANS_NS))
         yield _shown(board)
         if board.pc == stop and turn > SLICES // 2:
             break
@@ -173,11 +169,8 @@ def _asked(core: str, _: random.Random, *, makes_accesses: bool = False) -> Iter
         for number in COUNTED:
             board.restore(fresh)
             lines = [f"program {number}"]
-            place, spans_ns = (
-                _image(makes_accesses=makes_accesses)[1][number],
-                (SPANS_NS, LONG_SPANS_NS)[makes_accesses],
-            )
-            for line in _lines(board, number, *place, is_exact=core == "exact", spans_ns=spans_ns):
+            place = _image(makes_accesses=makes_accesses)[1][number]
+            for line in _lines(board, number, *place, is_exact=core == "exact"):
                 shared = board.chip.engine.shared
                 accesses = f"{shared.access_cycle} {shared.access_pc:x} {shared.exact_stops}"
                 shown = f"{zlib.crc32(line.encode()):x} {_shared(board)}"
