@@ -19,7 +19,7 @@ from tests.bluepill_sim.core.walks.programs import assembled
 from tests.bluepill_sim.machine import STACK, listen
 from tests.tools.suite.approved import judge_alike, judge_of
 
-PROGRAMS, SLICES = 30, 40
+PROGRAMS, OF_ACCESSES, SLICES = 30, 14, 40
 #: Programs of which it is counted, too, what C leaves to Python.
 COUNTED = range(0, PROGRAMS, 2)
 #: What C calls Python for where the numbers matter: an access, a trap, an event, each at its time.
@@ -43,7 +43,7 @@ _NVIC = ("pending", "active", "enabled", "levels", "priority_grouping")
 
 @cache
 def _image(*, makes_accesses: bool = False) -> tuple[Image, list[tuple[int, int]]]:
-    return assembled(PROGRAMS, "accesses" if makes_accesses else "bg", makes_accesses=makes_accesses)
+    return assembled(OF_ACCESSES, "accesses", makes_accesses=True) if makes_accesses else assembled(PROGRAMS, "bg")
 
 
 def _board(core: str, *, makes_accesses: bool = False) -> BluePill:
@@ -166,7 +166,7 @@ def _asked(core: str, _: random.Random, *, makes_accesses: bool = False) -> Iter
     fresh = board.snapshot()
     assert isinstance(board.chip.engine, NativeEngine)
     with patch.object(NativeEngine, "go_on", run):
-        for number in COUNTED:
+        for number in range(OF_ACCESSES) if makes_accesses else COUNTED:
             board.restore(fresh)
             lines = [f"program {number}"]
             place = _image(makes_accesses=makes_accesses)[1][number]
