@@ -143,7 +143,7 @@ class ProgramWriter:
         )  # fmt: skip
         if makes_accesses:
             self._kinds = (
-                self.mixed, self.mixed, self.mixed, self.mixed, self.several, self.conditional, self.ambiguous,
+                *(self.mixed,) * 8, self.several, self.conditional, self.ambiguous,
                 self.bits, self.narrow, self.many_reads, self.flash_write, self.tick, self.timer, self.unprivileged,
             )  # fmt: skip
 
@@ -248,7 +248,8 @@ class ProgramWriter:
 
     def mixed(self) -> str:
         """Make several accesses in a row, through three registers; and again, when what is warned of once is known."""
-        bases, label = enumerate(self._dice.sample(_MIXED, 3), 1), self._label()
+        first, other = self._dice.sample(_MIXED, 2)
+        bases, label = enumerate((first, other, first + self._dice.choice((0, 4, 8))), 1), self._label()
         lines = f"movs r0, #{self._dice.randrange(2, 5)}\nmov r12, r0\n{label}: "
         lines += "".join(f"mov32 r{n}, #{base}\n" for n, base in bases)
         for _ in range(self._dice.randrange(4, 9)):
