@@ -18,6 +18,8 @@ MOST_FILES = 16
 NOT_COUNTED = 4
 #: Seconds that a file of tests is taken to last, of which nothing is known, and at least.
 UNKNOWN_S, LEAST_S = 1.0, 0.2
+#: How many are asked before those of another package that hold all that it does with this one, and how many of those.
+NEAREST, OF_ELSEWHERE = 6, 2
 #: How much more seldom one that stands further away notices something, as a power of its place.
 SELDOM = 1.5
 #: A word in the names of files of tests that hold all that a module does at once: they are asked first.
@@ -204,7 +206,9 @@ class Nearest:
         others = sorted(
             ran - {*near}, key=lambda name: (WHOLE not in _words(name), _apart(mirror, _folder(name)), name)
         )
-        known = [*near, *others][: MOST_FILES - NOT_COUNTED]
+        # Some that hold all that another package does with it come before the last of those that are nearest.
+        elsewhere = [name for name in (*near[NEAREST:], *others) if WHOLE in _words(name)][:OF_ELSEWHERE]
+        known = [*dict.fromkeys((*near[:NEAREST], *elsewhere, *near, *others))][: MOST_FILES - NOT_COUNTED]
         # What was written since the suite was counted is known by its imports alone.
         return (*known, *[name for name in by_name if name not in known][:NOT_COUNTED])
 
