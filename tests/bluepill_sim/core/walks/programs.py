@@ -487,14 +487,20 @@ class ProgramWriter:
         """Do something without privilege, and come back by SVC."""
         inside = self._guarded(
             self._dice.choice(
-                (self.system, self.system_read, self.peripheral, self.masks, self.request, self.bits, self.sleep)
+                (self.system, self.system_read, self.peripheral, self.masks, self.request, self.bits, self.sleep,
+                 self.user_request)
             )()
-        )
+        )  # fmt: skip
         control, back = self._dice.choice((1, 1, 3)), self._guarded("svc #7\n")
+        settings = f"mov32 r1, #0xE000ED14\nmov32 r0, #{self._dice.choice((0x202, 0x200))}\nstr r0, [r1, #0]\n"
         return (
-            f"cpsie i\ncpsie f\nmov32 r0, #{PROCESS_STACK}\nmsr psp, r0\nmovs r0, #0\nmsr basepri, r0\n"
+            f"{settings}cpsie i\ncpsie f\nmov32 r0, #{PROCESS_STACK}\nmsr psp, r0\nmovs r0, #0\nmsr basepri, r0\n"
             f"movs r0, #{control}\nmsr control, r0\nisb\n{inside}{back}movs r0, #0\nmsr control, r0\n"
         )
+
+    def user_request(self) -> str:
+        """Make an interrupt pending by its number, as a thread without privilege may where USERSETMPEND is set."""
+        return f"mov32 r1, #0xE000EF00\nmovs r2, #{self._dice.randrange(44)}\nstr r2, [r1, #0]\nldr r0, [r1, #0]\n"
 
     def sram_code(self) -> str:
         """Call code in SRAM, change it, and call it again."""
