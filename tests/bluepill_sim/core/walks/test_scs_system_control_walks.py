@@ -33,11 +33,14 @@ _SHOWN = (
     0xE000_E400, 0xE000_E428, 0xE000_ED04, 0xE000_ED08, 0xE000_ED0C, 0xE000_ED10, 0xE000_ED14, 0xE000_ED18,
     0xE000_ED20, 0xE000_ED24, 0xE000_ED28, 0xE000_EDFC, 0xE004_2004,
 )  # fmt: skip
+#: What threads without privilege may write, or not: at both ends of each eight stimulus ports, behind them, and STIR.
+_OPEN = (*(offset + end for offset in range(0, 0x80, 0x20) for end in (0, 0x1C)), 0x80, 0xE400, 0xEF00)
 #: Addresses of the host, and what only a run sets.
 _OWN = {"sram", "flash", "scratch", "fault", "last", "logged", "exact_stops", "is_python"}
 _AIRCR, _DEMCR, _LAR, _TCR, _TER, _STIR = 0xE000_ED0C, 0xE000_EDFC, 0xE000_0FB0, 0xE000_0E80, 0xE000_0E00, 0xE000_EF00
 #: Written now and then, since much hangs on them.
 _KEYS = (
+    (0xE000_0E40, 5), (0xE000_0E40, 8), (0xE000_0E40, 2), (0xE000_ED14, 0x202),
     (_TCR, 0), (_TER, 0), (_TER, 2), (0xE000_0004, 3), (0xE000_0008, 4),
     (0xE000_0000, 0x1234_5678), (0xE000_0004, 0xFFFF_FFFF), (0xE000_007C, 1),
     (_LAR, 0xC5AC_CE55), (_LAR, 1), (_DEMCR, 0x0107_0000), (_DEMCR, 0), (_AIRCR, 0x05FA_0300),
@@ -79,7 +82,8 @@ class _Bus:
 
     def shown(self) -> str:
         """Return what reads give that change nothing."""
-        return " ".join(map(self.read, _SHOWN))
+        is_open = "".join(f"{self.system.is_open_to_all(offset):d}" for offset in _OPEN)
+        return f"{' '.join(map(self.read, _SHOWN))} {is_open}"
 
     def write(self, address: int, size: int, value: int) -> str:
         """Return whether a write is known."""
