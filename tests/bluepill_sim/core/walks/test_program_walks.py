@@ -2,30 +2,19 @@
 
 import random
 import zlib
-from collections import Counter
 from collections.abc import Iterator
 from functools import cache, partial
-from unittest.mock import patch
 
 from bluepill_sim import BluePill
 from bluepill_sim.core import Reg
 from bluepill_sim.core.unicorn_core import GENERAL
-from bluepill_sim.extension.layout import SHARED
 from bluepill_sim.extension.library import core_chosen
-from bluepill_sim.native.engine import NativeEngine
 from bluepill_sim.program.image import Image
-from tests.bluepill_sim.core.walks.counted_calls import counted_calls
 from tests.bluepill_sim.core.walks.programs import assembled
 from tests.bluepill_sim.machine import STACK, listen
 from tests.tools.suite.approved import judge_alike, judge_of
 
-PROGRAMS, OF_ACCESSES, SLICES = 30, 14, 40
-#: Programs of which it is counted, too, what C leaves to Python.
-COUNTED = range(0, PROGRAMS, 2)
-#: What C calls Python for where the numbers matter: an access, a trap, an event, each at its time.
-_NOTED = frozenset({
-    "read", "write", "trapped", "bad_access", "write_at_once", "unknown_block", "event", "bus", "code_written",
-})  # fmt: skip
+PROGRAMS, SLICES = 30, 40
 #: Time between two looks, ns.
 SPANS_NS = (1, 125, 1_000, 4_000, 20_000, 60_000)
 #: The cores that go from block to block, and so show the same.
@@ -36,19 +25,18 @@ _SYSTEM = (
     "exception_number", "sleep", "event_register", "vector_table", "scr", "ccr", "shcsr", "cfsr", "hfsr", "mmfar",
     "bfar", "is_locked_up", "last_sleep_cycle", "bus_error_cycle", "bus_error_pc", "bus_error_address",
 )  # fmt: skip
-#: What the host decides, or is shown itself.
-_OF_THE_HOST = frozenset({"sram", "flash", "scratch", "fault", "last"})
 _NVIC = ("pending", "active", "enabled", "levels", "priority_grouping")
 
 
 @cache
-def _image(*, makes_accesses: bool = False) -> tuple[Image, list[tuple[int, int]]]:
-    return assembled(OF_ACCESSES, "accesses", makes_accesses=True) if makes_accesses else assembled(PROGRAMS, "bg")
+def image() -> tuple[Image, list[tuple[int, int]]]:
+    """Return the programs."""
+    return assembled(PROGRAMS, "bg")
 
 
-def _board(core: str, *, makes_accesses: bool = False) -> BluePill:
+def _board(core: str) -> BluePill:
     with core_chosen(core):
-        return BluePill(_image(makes_accesses=makes_accesses)[0])
+        return BluePill(image()[0])
 
 
 def _request(board: BluePill, line: int, *, stays: bool) -> None:
@@ -66,13 +54,6 @@ def _raise(board: BluePill, lines: list[int]) -> None:
     for level in (True, False):
         for line in lines:
             board.chip.fabric.set_line(line, level)
-
-
-def _shared(board: BluePill) -> str:
-    """Return a checksum of all that C keeps of the core, but addresses of the host."""
-    shared = board.chip.processor.shared
-    values = (getattr(shared, one.name) for one in SHARED.fields if one.name not in _OF_THE_HOST)
-    return f"{zlib.crc32(str([each if isinstance(each, int) else bytes(each) for each in values]).encode()):x}"
 
 
 def _shown(board: BluePill) -> str:
@@ -100,12 +81,12 @@ def _episodes(core: str, _: random.Random) -> Iterator[str]:
     """Yield what each program shows, in its turn on one board."""
     board = _board(core)
     fresh = board.snapshot()
-    for number, (base, stop) in enumerate(_image()[1]):
+    for number, (base, stop) in enumerate(image()[1]):
         board.restore(fresh)
-        yield "\n".join([f"program {number}", *_lines(board, number, base, stop, is_exact=core == "exact")])
+        yield "\n".join([f"program {number}", *lines_of(board, number, base, stop, is_exact=core == "exact")])
 
 
-def _lines(board: BluePill, number: int, base: int, stop: int, *, is_exact: bool) -> Iterator[str]:
+def lines_of(board: BluePill, number: int, base: int, stop: int, *, is_exact: bool) -> Iterator[str]:
     """Yield what a program shows from time to time; some are watched, recorded, saved and restored."""
     dice, chip = random.Random(f"slices {number}"), board.chip
     edges: list[tuple[str, str, int]] = []
@@ -142,47 +123,6 @@ def _lines(board: BluePill, number: int, base: int, stop: int, *, is_exact: bool
     yield f"{rows} {edges} {[str(warning) for warning in board.warnings]} {board.fault!r}"
 
 
-def _asked(core: str, _: random.Random, *, makes_accesses: bool = False) -> Iterator[str]:
-    """Yield how often C calls Python, by what for, while programs run; rows of blocks, and the last access at its time.
-
-    What it can answer itself it does; of a loop that waits it writes the last rows alone, however long it goes round.
-    Of accesses and traps it is noted which they are, when, and by which instruction; and how often a run came back.
-    """
-    counts, notes, go_on = Counter[str](), list[str](), NativeEngine.go_on
-
-    def run(engine: NativeEngine, limit: int) -> object:
-        counts["run"] += 1
-        return go_on(engine, limit)
-
-    def note(name: str, arguments: tuple[int, ...]) -> None:
-        if name in _NOTED:
-            shared = board.chip.processor.shared
-            at = f"{shared.access_cycle}/{shared.access_pc:x}" if shared.in_access else shared.cycle
-            notes.append(f"{name} {' '.join(f'{each or 0:x}' for each in arguments)} @{at}")
-
-    with counted_calls(counts, note):
-        board = _board(core, makes_accesses=makes_accesses)
-    notes.clear()
-    fresh = board.snapshot()
-    assert isinstance(board.chip.engine, NativeEngine)
-    with patch.object(NativeEngine, "go_on", run):
-        for number in range(OF_ACCESSES) if makes_accesses else COUNTED:
-            board.restore(fresh)
-            lines = [f"program {number}"]
-            place = _image(makes_accesses=makes_accesses)[1][number]
-            for line in _lines(board, number, *place, is_exact=core == "exact"):
-                shared = board.chip.engine.shared
-                accesses = f"{shared.access_cycle} {shared.access_pc:x} {shared.exact_stops}"
-                shown = f"{zlib.crc32(line.encode()):x} {_shared(board)}"
-                lines.append(f"{shown} {shared.logged} {accesses} {sorted(counts.items())} {notes}")
-                counts.clear()
-                notes.clear()
-            yield "\n".join(lines)
-
-
-TRACES = {core: partial(_episodes, core) for core in (*CORES, "exact")} | {
-    f"{core} {name}": partial(_asked, core, makes_accesses=name == "accesses")
-    for core in ("native", "own") for name in ("asked", "accesses")
-}  # fmt: skip
+TRACES = {core: partial(_episodes, core) for core in (*CORES, "exact")}
 test_a_walk_shows_what_was_approved = judge_of(__file__, TRACES)
 test_cores_that_go_from_block_to_block_show_the_same = judge_alike(__file__, CORES)
