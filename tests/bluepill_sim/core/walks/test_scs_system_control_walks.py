@@ -99,6 +99,13 @@ class _Bus:
             nvic.deactivate(16 + irq)
         return f"irq {irq} {level} {nvic.first_pending()} {nvic.active_priority()} {nvic.deliverable():x}"
 
+    def serve(self, dice: random.Random) -> str:
+        """Begin or end the handler of an exception of the core, or make it pending."""
+        nvic, number = self.board.chip.processor.nvic, dice.choice((2, 3, 4, 5, 6, 11, 12, 14, 15))
+        act = dice.choice((nvic.activate, nvic.activate, nvic.deactivate, nvic.pend))
+        act(number)
+        return f"{act.__name__} {number} {nvic.first_pending()} {nvic.active_priority()}"
+
     def wait(self, cycles: int) -> str:
         """Let time pass."""
         chip = self.board.chip
@@ -160,7 +167,8 @@ def _walk(_: random.Random) -> Iterator[str]:
         elif kind < 8:
             done = f"{address:x}/{size} {bus.read(address, size)}"
         else:
-            done = bus.line(dice) if kind < 9 else bus.wait(dice.choice((1, 7, 50, 100, 1_000)))
+            act = dice.choice((bus.line, bus.serve)) if kind < 9 else None
+            done = act(dice) if act is not None else bus.wait(dice.choice((1, 7, 50, 100, 1_000)))
         yield f"{done} {bus.changed()}\n{bus.shown()} {bus.changed()}"
     for act in (bus.system.enable_trace, bus.system.reset, bus.system.lose_power):
         act()
