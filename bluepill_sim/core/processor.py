@@ -492,7 +492,7 @@ class Processor(Stateful):
     def _act_on(self, halt: Halt) -> None:
         kind = halt.kind
         if kind in DEBUG_HALTS or (kind is HaltKind.BKPT and self.halts_on_bkpt):
-            if kind not in DEBUG_HALTS or not self._take_own_point(halt):
+            if not self._take_own_point(halt):
                 self.halt = halt
             return
         if kind is HaltKind.EXCEPTION_RETURN:

@@ -359,7 +359,6 @@ class Can(Peripheral):
             return True
         best = self._best(at_ns)
         self._lost += () if best is None else (best,)
-        self.plan()
         return False
 
     def end(self, end: CanEnd) -> None:

@@ -155,7 +155,7 @@ class _Version:
                     pool = min(pool, literal - start)
                 tokens.append(("literal", one.target, self._meaning(literal)))
                 plain.append(f"literal {self._meaning(literal)}")
-            elif one.kind in {Kind.BRANCH, Kind.CALL} and one.destination is not None:
+            elif one.destination is not None:
                 if start <= one.destination < end:
                     targets[one.address] = one.destination
                     tokens.append(("branch", _without_offset(one, word)))

@@ -30,6 +30,8 @@ class Sequence:
             adapter_settings, robot=robot, start=start, waits_for_edges=waits_for_edges, has_uart=has_uart, **pinout
         )
         self.width = 4 if has_four_bits else 3
+        #: Whether both do what was due before they take what comes: a UART keeps it for them.
+        self._may_be_late = not waits_for_edges and not has_uart
         #: Of the robot when it is found to stand at its origin.
         self.rim_speed = 0
         self.twins.pass_time(310 * MS)
@@ -130,6 +132,22 @@ class Sequence:
 
     def _master(self, master: Master) -> None:
         self.twins.master(master)
+
+    def _late(self, what: str, after: Nanos) -> None:
+        """Do something at or behind a deadline to which nobody has brought either."""
+        twins, due = self.twins, self.twins.model.next_deadline()
+        if due is not None and self._may_be_late:
+            twins.now = max(twins.now, due + after)
+        if what == "sip":
+            twins.send_sip()
+        elif what == "answer":
+            twins.answer()
+        elif what == "pad":
+            twins.pad(PadReport(up=after == 1, down=after == 2, forward=600))
+        elif what == "master":
+            twins.master(Master.PAD if twins.model.master is Master.BLUEPILL else Master.BLUEPILL)
+        else:
+            twins.shutdown()
 
     def _rare(self, what: str) -> None:
         if what == "shutdown":

@@ -309,6 +309,13 @@ def test_more_than_the_receiver_holds_is_lost_and_the_console_goes_on(shell: She
     assert "P2OS adapter" in shell.type("version")
 
 
+@pytest.mark.parametrize(("length", "is_taken"), [(79, True), (80, False)])
+def test_a_line_has_79_characters_at_most(shell: Shell, length: int, is_taken: bool) -> None:
+    shell.run_ms(BOOT_MS + 10)
+    said = shell.type("get pulse_ns".ljust(length))
+    assert ("pulse_ns" in said, "error: the line is longer than 79 characters" in said) == (is_taken, not is_taken)
+
+
 def test_another_line_speed_is_tried_when_nobody_answers(shell: Shell) -> None:
     shell.run_ms(BOOT_MS + 10)
     shell.type("set baud1 38400")

@@ -1,8 +1,11 @@
 """The circuit simulations: every figure within its limits (with ngspice), and how decks are read (everywhere)."""
 
 import dataclasses
+import os
 import sys
+from collections.abc import Callable
 from functools import cache
+from pathlib import Path
 
 import pytest
 
@@ -20,12 +23,70 @@ from hardware.pcb.spice.netlist import node
 from hardware.pcb.spice.page import page_text, shown
 from hardware.pcb.spice.signal_decks import signal_decks
 from hardware.pcb.spice.supply_decks import supply_decks
-from simbase.errors import MissingDependencyError
+from simbase.errors import MissingDependencyError, one_line
 
 needs_ngspice = pytest.mark.skipif(
     not run.is_installed(), reason="ngspice is not installed: the circuits are not simulated (hint: make board)"
 )
 DECKS = {deck.name: deck for deck in decks()}
+
+
+#: A deck of two measures and two traces.
+SMALL = Deck(
+    name="small", title="Small", circuit="R1 a 0 1k\n.op", measures=("tran low", "tran high"),
+    limits=limits(("low", -1.0, 1.0, "V", "least"), ("high", 2.0, 2.5, "V", "most")),
+    traces=(("v(a)", "a"), ("v(b)", "b")), x_label="s", y_label="V", cannot_say="all else",
+)  # fmt: skip
+
+
+#: More than is shown of what ngspice says, no part of it like another.
+WORDS = "".join(f"{number}." for number in range(1000, 1200))
+
+
+@pytest.fixture
+def answering(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
+    """Have a script in ngspice's place that runs some lines of a shell, in the folder of the call."""
+
+    def put(lines: str) -> None:
+        script = tmp_path / "ngspice"
+        script.write_text(f"#!/bin/sh\n{lines}\n", encoding="utf-8")
+        script.chmod(0o755)
+        monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
+
+    return put
+
+
+def test_figures_and_traces_are_what_ngspice_writes(answering: Callable[[str], None]) -> None:
+    answering(
+        'test "$1" = -b && grep -q "^meas tran high$" "$2" || exit 1\n'
+        'grep -q "^wrdata .*/traces.txt v(a) v(b)$" "$2" || exit 1\n'
+        "echo 'low                 =  -1.000000e+00 at=  2.0'\necho 'high = 2.6'\n"
+        "printf '0 1 0 2\\n0.5 3 0.5 4\\n' > traces.txt"
+    )
+    found = run.simulate(SMALL)
+    assert found.figures == {"low": -1.0, "high": 2.6}
+    assert found.columns == [[0.0, 0.5], [1.0, 3.0], [2.0, 4.0]]
+    assert [(limit.measure, value, good) for limit, value, good in found.verdicts()] == [
+        ("low", -1.0, True),
+        ("high", 2.6, False),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("lines", "lacks"),
+    [
+        ("echo 'low = 0.5'; echo > traces.txt", "high"),
+        ("echo > traces.txt", "low, high"),
+        ("echo 'low = 0.5'; echo 'high = 2.1'", "the traces"),
+    ],
+)
+def test_what_ngspice_does_not_give_is_named_with_its_last_words(
+    answering: Callable[[str], None], lines: str, lacks: str
+) -> None:
+    answering(f"{lines}\necho '{WORDS}' >&2")
+    with pytest.raises(run.SimulationError) as raised:
+        run.simulate(SMALL)
+    assert str(raised.value) == one_line(f"small: no figure for {lacks}\n{WORDS[-599:]}\n")
 
 
 @needs_ngspice

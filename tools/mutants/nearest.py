@@ -18,6 +18,8 @@ MOST_FILES = 16
 NOT_COUNTED = 4
 #: Seconds that a file of tests is taken to last, of which nothing is known, and at least.
 UNKNOWN_S, LEAST_S = 1.0, 0.2
+#: How many are asked before those of another package that hold all that it does with this one, and how many of those.
+NEAREST, OF_ELSEWHERE = 6, 2
 #: How much more seldom one that stands further away notices something, as a power of its place.
 SELDOM = 1.5
 #: A word in the names of files of tests that hold all that a module does at once: they are asked first.
@@ -27,6 +29,8 @@ WHOLE = "walks"
 DECLARED, OF_DECLARED = "tests.tools.suite.declared", 2
 #: How many lines below one that is counted another may stand in the same statement of C.
 STATEMENT = 3
+#: Programs at random, which go through most of the emulated core.
+PROGRAM_WALKS = tuple(f"tests/bluepill_sim/core/walks/test_{name}_walks.py" for name in ("left_to_python", "program"))
 #: What tests a library in C or C++, by the folder of its sources or by a file: there are no imports to read. Of those
 #: that were counted at a line, these come first, in this order.
 TESTS_OF_C = {
@@ -38,9 +42,9 @@ TESTS_OF_C = {
     # What few tests reach.
     "bluepill_sim/extension/source/core/latency.c": (
         "tests/bluepill_sim/analysis/test_races.py", "tests/bluepill_sim/analysis/walks/test_races_walks.py",
-        "tests/bluepill_sim/core/walks/test_program_walks.py", "tests/bluepill_sim/cli/test_whole_answers.py"),
+        *PROGRAM_WALKS, "tests/bluepill_sim/cli/test_whole_answers.py"),
     "bluepill_sim/extension/source/core/forced.c": (
-        "tests/bluepill_sim/core/walks/test_program_walks.py", "tests/bluepill_sim/peripherals/pins/test_floating.py",
+        *PROGRAM_WALKS, "tests/bluepill_sim/peripherals/pins/test_floating.py",
         *(f"tests/bluepill_sim/native/test_native_{name}.py"
           for name in ("registers", "warned", "ambiguous", "core", "random_registers")),
         "tests/bluepill_sim/fabric/test_ahead.py",
@@ -50,11 +54,45 @@ TESTS_OF_C = {
         "tests/bluepill_sim/core/interpreter/test_heap.py", "tests/bluepill_sim/cli/test_whole_answers.py",
         "tests/bluepill_sim/analysis/test_silicon_pins.py"),
     "bluepill_sim/extension/source/fabric/ahead.c": (
-        "tests/bluepill_sim/fabric/test_ahead.py", "tests/bluepill_sim/core/walks/test_program_walks.py",
+        "tests/bluepill_sim/fabric/test_ahead.py", *PROGRAM_WALKS,
         "tests/bluepill_sim/fabric/walks", "tests/bluepill_sim/peripherals/buses/test_bits_on_pins.py",
         "tests/bluepill_sim/fabric"),
+    "bluepill_sim/extension/source/core/access.c": (
+        *PROGRAM_WALKS,
+        "tests/bluepill_sim/walks/test_native_registers_walks.py",
+        *(f"tests/bluepill_sim/native/test_native_{name}.py"
+          for name in ("registers", "ambiguous", "warned", "system", "random_registers", "core", "polling")),
+        *(f"tests/bluepill_sim/core/test_{name}.py" for name in ("forced_bits", "core_parts", "imprecise_faults")),
+        "tests/bluepill_sim/core/walks", "tests/bluepill_sim/peripherals/walks/test_gpio_afio_exti_crc_walks.py",
+        "tests/bluepill_sim/native"),
+    "bluepill_sim/extension/source/core/host.c": (
+        *(f"tests/bluepill_sim/peripherals/walks/test_{name}_walks.py" for name in ("adc_dma", "usart", "spi_i2c")),
+        *PROGRAM_WALKS, "tests/bluepill_sim/native/test_native_dma.py",
+        "tests/bluepill_sim/peripherals/dma", "tests/bluepill_sim/native/test_bus_device.py",
+        *(f"tests/bluepill_sim/core/test_{name}.py" for name in ("sleep", "late_arrival", "time")),
+        *(f"tests/bluepill_sim/native/test_native_{name}.py" for name in ("core", "timers", "polling"))),
+    "bluepill_sim/extension/source/core/run.c": (
+        *(f"tests/bluepill_sim/core/walks/test_{name}_walks.py"
+          for name in ("left_to_python", "program", "faults", "points", "counting_loops")),
+        *(f"tests/bluepill_sim/core/interpreter/test_{name}.py"
+          for name in ("exact", "own_core", "continued", "chaining")),
+        *(f"tests/bluepill_sim/core/test_{name}.py"
+          for name in ("sleep", "time", "late_arrival", "debug_halts", "exceptions")),
+        *(f"tests/bluepill_sim/native/test_native_{name}.py" for name in ("core", "polling", "system"))),
+    "bluepill_sim/extension/source/core/exceptions.c": (
+        *PROGRAM_WALKS, *(f"tests/bluepill_sim/core/walks/test_{name}_walks.py" for name in ("faults", "points")),
+        *(f"tests/bluepill_sim/core/interpreter/test_{name}.py" for name in ("continued", "exact")),
+        *(f"tests/bluepill_sim/core/test_{name}.py"
+          for name in ("late_arrival", "masks", "stacks", "sleep", "imprecise_faults", "faults", "time", "traps")),
+        *(f"tests/bluepill_sim/native/test_native_{name}.py" for name in ("system", "core"))),
+    # What counts in cycles, and what counts in ticks of a timer.
+    "bluepill_sim/extension/source/fabric/ramp.c": (
+        *(f"tests/bluepill_sim/core/walks/test_{name}_walks.py"
+          for name in ("scs_system_control", "left_to_python", "program", "counting_loops")),
+        "tests/bluepill_sim/peripherals/walks/test_tim_walks.py", "tests/bluepill_sim/test_timers.py",
+        "tests/bluepill_sim/peripherals/tim", "tests/bluepill_sim/core/test_time.py", "tests/bluepill_sim/fabric"),
     "bluepill_sim/extension/source/core/blocks.c": (
-        "tests/bluepill_sim/core/walks/test_program_walks.py", "tests/bluepill_sim/core/interpreter/test_heap.py",
+        *PROGRAM_WALKS, "tests/bluepill_sim/core/interpreter/test_heap.py",
         *(f"tests/bluepill_sim/core/interpreter/test_{name}.py"
           for name in ("exact", "continued", "own_core", "chaining")),
         *(f"tests/bluepill_sim/core/test_{name}.py" for name in ("block_log", "late_arrival", "core_parts", "time")),
@@ -62,21 +100,22 @@ TESTS_OF_C = {
         "tests/bluepill_sim/debug/cores/test_core_comparison.py", "tests/bluepill_sim/analysis/test_races.py"),
     "bluepill_sim/extension/source/core/tlb.c": (
         "tests/bluepill_sim/native/test_native_tlb.py", "tests/bluepill_sim/core/test_flash_patch.py",
-        "tests/bluepill_sim/core/walks/test_program_walks.py", "tests/bluepill_sim/native"),
+        *PROGRAM_WALKS, "tests/bluepill_sim/native"),
     "bluepill_sim/extension/source/devices": (
         *(f"tests/bluepill_sim/native/test_native_{name}.py"
           for name in ("random_registers", "registers", "timers", "dma", "streams")),
         "tests/bluepill_sim/peripherals/sequences", "tests/bluepill_sim/peripherals", "tests/bluepill_sim/native"),
     "bluepill_sim/extension/source/interpreter": (
-        "tests/bluepill_sim/core/walks/test_program_walks.py",
+        *PROGRAM_WALKS,
         *(f"tests/bluepill_sim/core/interpreter/test_{name}.py"
-          for name in ("tidy", "memory_bounds", "against_unicorn", "blocks_decode", "special", "own_core", "exact")),
+          for name in ("tidy", "memory_bounds", "hooks", "blocks_decode", "special", "continued", "against_unicorn",
+                       "exact", "own_core")),
         "tests/bluepill_sim/core/interpreter/test_heap.py",
         "tests/bluepill_sim/core/interpreter", "tests/bluepill_sim/core/test_kernels.py",
         "tests/bluepill_sim/core/test_flag_vectors.py", "tests/bluepill_sim/native/test_native_core.py",
         "tests/bluepill_sim/core", "tests/bluepill_sim/native"),
     "bluepill_sim/extension/source/core": (
-        "tests/bluepill_sim/core/walks/test_program_walks.py",
+        *PROGRAM_WALKS,
         *(f"tests/bluepill_sim/core/test_{name}.py"
           for name in ("exceptions", "faults", "imprecise_faults", "late_arrival", "masks", "stacks", "time", "traps")),
         *(f"tests/bluepill_sim/native/test_native_{name}.py" for name in ("system", "core", "polling", "ambiguous")),
@@ -86,7 +125,8 @@ TESTS_OF_C = {
         "tests/bluepill_sim/board/test_resets.py", "tests/bluepill_sim/core", "tests/bluepill_sim/native",
         "tests/bluepill_sim/peripherals/walks/test_adc_dma_walks.py"),
     "bluepill_sim/extension/source/fabric": (
-        "tests/bluepill_sim/fabric/walks", "tests/bluepill_sim/fabric",
+        "tests/bluepill_sim/fabric/walks", *PROGRAM_WALKS,
+        "tests/bluepill_sim/fabric",
         *(f"tests/bluepill_sim/peripherals/walks/test_{name}_walks.py" for name in ("tim", "spi_i2c")),
         "tests/bluepill_sim/test_timers.py", "tests/bluepill_sim/peripherals/tim/test_tim.py",
         "tests/bluepill_sim/core/test_core_parts.py", "tests/bluepill_sim/native"),
@@ -168,7 +208,9 @@ class Nearest:
         others = sorted(
             ran - {*near}, key=lambda name: (WHOLE not in _words(name), _apart(mirror, _folder(name)), name)
         )
-        known = [*near, *others][: MOST_FILES - NOT_COUNTED]
+        # Some that hold all that another package does with it come before the last of those that are nearest.
+        elsewhere = [name for name in (*near[NEAREST:], *others) if WHOLE in _words(name)][:OF_ELSEWHERE]
+        known = [*dict.fromkeys((*near[:NEAREST], *elsewhere, *near, *others))][: MOST_FILES - NOT_COUNTED]
         # What was written since the suite was counted is known by its imports alone.
         return (*known, *[name for name in by_name if name not in known][:NOT_COUNTED])
 

@@ -209,7 +209,7 @@ def _judged(met: Met, signal: Signal, found: Alignment, how: tuple[Tolerance, fl
         if after == j + 1 and j not in unseen and met.track.run[after][0] - met.track.run[j][0] < sample_ns:
             unseen |= {j, after}
     times = ((i, found.clock.in_run(met.track.capture[i][0])) for i in met.added)
-    added = [i for i, at in times if not (signal.unknown and signal.is_unknown(at, limits.near_ns))]
+    added = [i for i, at in times if not signal.is_unknown(at, limits.near_ns)]
     missing = [j for j in met.missing if j not in unseen]
     return replace(met, added=added, missing=missing), len(met.added) - len(added) + len(unseen)
 

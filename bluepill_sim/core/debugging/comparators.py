@@ -69,7 +69,7 @@ def points_of(shared: Any) -> Points:
             elif n == 0 and function & _CYCMATCH:
                 continue
             elif kind == _PC_MATCH:
-                instructions |= dict.fromkeys(range(at & ~1, at + max(size, 1), 2), n)
+                instructions |= dict.fromkeys(range(at & ~1, at + size, 2), n)
             elif kind:
                 accesses[Watchpoint(at, size, _WATCHES[kind])] = n
     # The FPB's table is in SRAM (ARM C1.11.4: bits 31 to 29 of FP_REMAP are 001).

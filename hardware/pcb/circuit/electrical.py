@@ -224,7 +224,7 @@ def ratings(design: BoardDesign) -> list[Check]:
     """Judge every capacitor's voltage and the hottest resistor's power."""
     worst = 0.0
     for component in design.components:
-        if "farad" in component.part.facts and "voltage_v" in component.part.facts:
+        if "farad" in component.part.facts:
             volts = max(abs(_NET_V.get(net or "", RAIL_V)) for _, net in component.pins)
             worst = max(worst, volts / component.part.facts["voltage_v"])
     watts = max(

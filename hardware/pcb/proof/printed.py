@@ -157,9 +157,7 @@ def _reference(board: PrintedBoard, part: SilkPart) -> Iterator[str]:
         if mark.text != part.ref:
             yield f"{part.ref} is printed as {mark.text}"
         own = _beside(part, mark.at)
-        gap, ref = min(
-            (_beside(one, mark.at), ref) for ref, one in board.parts.items() if one.lands and one is not part
-        )
+        gap, ref = min((_beside(one, mark.at), ref) for ref, one in board.parts.items() if one.lands)
         if gap < own - TIE_MM:
             yield f"the reference of {part.ref} stands at {ref}"
 

@@ -20,8 +20,8 @@ def settings_of(draw: random.Random) -> AdapterSettings:
         motor_command=draw.choice((MotorCommand.BITS, MotorCommand.BITS, MotorCommand.DUTY)),
         bit_order=draw.choice(tuple(BitOrder)),
         motor_meaning=draw.choice(tuple(MotorMeaning)),
-        step_um_per_s=draw.choice((62_500, 100_001, 250_000)),
-        angular_step_urad_per_s=draw.choice((425_000, 100_000)),
+        step_um_per_s=draw.choice((62_500, 100_001, 250_000, 400_000)),
+        angular_step_urad_per_s=draw.choice((425_000, 100_000, 2_000_000)),
         max_velocity_mm_s=draw.choice((None, None, 0, 150)),
         max_rotation_deg_s=draw.choice((None, None, 17)),
         sample_count=draw.choice((1, 3, 5, 9)),
@@ -34,7 +34,7 @@ def settings_of(draw: random.Random) -> AdapterSettings:
         stop_unknown_robot=draw.random() < 0.7,
         stop_repeats=draw.choice((0, 3)),
         pulse_ns=draw.choice((100 * MS, 1_000 * MS)),
-        pad_velocity_mm_s=draw.choice((400, 1_000)),
+        pad_velocity_mm_s=draw.choice((400, 1_000, 3_000)),
         pad_trigger_dead=draw.choice((0, 40)),
         bauds=draw.choice(((9_600,), (9_600, 38_400, 115_200))),
     )
@@ -86,12 +86,16 @@ GIVEN: Mapping[str, Callable[[random.Random], tuple[object, ...]]] = {
     ),
     "drive by pad": lambda draw: (draw.choice((0, 41, 500, 1023)), draw.choice((-512, 0, 300))),
     "master": lambda draw: (draw.choice(tuple(Master)),),
+    "late": lambda draw: (
+        draw.choice(("sip", "sip", "sip", "answer", "pad", "pad", "pad", "master", "shutdown")),
+        draw.choice((0, 1, 1, 2)),
+    ),
     "rare": lambda draw: (draw.choice(("shutdown", "reset", "restore", "half frame")),),
 }
 #: What keeps a session going comes often, what ends it seldom.
 KINDS = (
     *("motors", "motors", "sips", "sips", "sip", "obey", "obey", "pwm", "noise", "damaged", "frame", "pin", "glitch"),
-    *("time", "time", "connect", "connect", "pad", "drive by pad", "master", "rare"),
+    *("late", "late", "time", "time", "connect", "connect", "pad", "drive by pad", "master", "rare"),
 )
 
 

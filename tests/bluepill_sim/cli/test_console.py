@@ -8,9 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from bluepill_sim.cli.console import PtyConsole, StreamConsole, connect, open_console
+from bluepill_sim.__main__ import run
+from bluepill_sim.cli import run as run_verb
+from bluepill_sim.cli.console import Console, PtyConsole, StreamConsole, connect, open_console
 from bluepill_sim.errors import BluePillError
 from simbase.errors import FileError
+from tests.tools.examples import EXAMPLES
 
 
 class Port:
@@ -107,3 +110,20 @@ def test_a_system_without_pseudo_terminals_says_so(monkeypatch: pytest.MonkeyPat
     monkeypatch.delattr(os, "openpty")
     with pytest.raises(BluePillError, match="cannot open a pseudo-terminal"):
         PtyConsole()
+
+
+@pytest.mark.parametrize(("words", "expected"), [([], b"\\x1b[2J"), (["--raw"], b"\x1b[2J")])
+@pytest.mark.parametrize("port", ["--uart", "--usb"])
+def test_raw_is_for_the_serial_port_over_usb_too(
+    port: str, words: list[str], expected: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capfdbinary: pytest.CaptureFixture[bytes],
+) -> None:  # fmt: skip
+    def send_at_once(console: Console, _port: object) -> Callable[[], None]:
+        console.write(b"\x1b[2J")
+        return lambda: None
+
+    monkeypatch.setattr(run_verb, "connect", send_at_once)
+    ports = {"--uart": str(tmp_path / "uart"), "--usb": str(tmp_path / "usb")} | {port: "-"}
+    options = [word for row in ports.items() for word in row]
+    assert run(["run", str(EXAMPLES / "usb_echo.elf"), "--for", "1us", *options, *words]) == 0
+    assert capfdbinary.readouterr().out.startswith(expected)

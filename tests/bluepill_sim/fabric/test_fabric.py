@@ -1,5 +1,6 @@
 """The fabric in C: the queue of events, lines, and pins against a plain model of each."""
 
+import ctypes
 import heapq
 from typing import Any
 
@@ -195,6 +196,15 @@ def test_there_are_128_slots_and_the_first_two_are_those_of_the_pins() -> None:
         fabric.add_slot(str(number), lambda _at: None)
     with pytest.raises(ValueError, match="no slot left"):
         fabric.add_slot("one more", lambda _at: None)
+
+
+def test_a_bus_master_reaches_four_memories_and_no_more() -> None:
+    fabric = Fabric(Chip())
+    slot = fabric.add_slot("master", lambda _at: None)
+    buffers = [ctypes.create_string_buffer(bytes([n, 1, 2, 3]), 4) for n in range(5)]
+    for n, buffer in enumerate(buffers):
+        fabric.add_memory(0x1000 * n, buffer, is_writable=False)
+    assert [fabric.bus_read(slot, 0x1000 * n, 4) for n in range(5)] == [*(0x0302_0100 + n for n in range(4)), None]
 
 
 def test_who_takes_an_earlier_time_shortens_the_slice() -> None:

@@ -4,8 +4,8 @@ import random
 import zlib
 from collections.abc import Iterator
 
-from tests.bluepill_sim.board.walks.test_board_walks import FLIPS
-from tests.bluepill_sim.machine import Machine
+from tests.bluepill_sim.board.walks.test_board_walks import FLIPS, SOURCES
+from tests.bluepill_sim.machine import Machine, listen
 from tests.tools.suite.approved import Trace, judge_of, said, tried
 
 #: The ends of flash, of its alias at 0, of the option bytes and of system memory.
@@ -75,5 +75,17 @@ def frozen(_draw: random.Random) -> Iterator[str]:
             yield f"{is_stopped} {word:x} {[part.name for part in chip._frozen_parts()]}"
 
 
-TRACES: dict[str, Trace] = {"programmed": programmed, "warned": warned, "frozen": frozen}
+def stepped(_draw: random.Random) -> Iterator[str]:
+    """Yield what each step comes to, and what subscribers have heard behind it."""
+    for source in (FLIPS, *SOURCES):
+        board = Machine(source, {}).deafen().board
+        heard: list[tuple[str, str, int]] = []
+        listen(board, heard, ends_slice={"PA1"})
+        for limit_ns in (*(10_000,) * 24, 0):
+            reached = board.step(limit_ns)
+            yield said([reached, board.pc, board.cycle, board.register("LR"), board.register("SP"), heard])
+            heard.clear()
+
+
+TRACES: dict[str, Trace] = {"stepped": stepped, "programmed": programmed, "warned": warned, "frozen": frozen}
 test_a_walk_shows_what_was_approved = judge_of(__file__, TRACES)

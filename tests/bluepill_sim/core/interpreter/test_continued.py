@@ -20,6 +20,8 @@ Boot = Callable[..., Machine]
 SYSTICK, CYCLE_NS, FRAME_BYTES = 15, 125, 32
 WORDS, PORT_A = 0x2000_0800, 0x4001_0800
 ICI_BITS = 0x0600_FC00
+#: At the first, second and third instruction of ITTTT AL, ITSTATE ends in 001, 010, 100: its bits 1:0 are at 26:25.
+FOUR_IN_IT = (0xE000 | 1 << 25, 0xE000 | 1 << 26, 0xE000 | 1 << 10)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,6 +57,7 @@ CASES = (
     # Inside an IT block it begins anew.
     Moved(name="it eq, ldmia r5", code=".half 0xE895, 0x0F00", is_load=True, most=0),
     Moved(name="it al, ldmia r5", code=".half 0xE895, 0x0F00", is_load=True, most=0),
+    Moved(name="itttt al, ldmia r5", code=".half 0xE895, 0x0F00", is_load=True, most=0),
     # chosen: a 16-bit STM with its base in the list, and what reaches for no memory, begin anew.
     Moved(name="stmia r5!, of r5", code=".half 0xC560", is_load=False, registers=(5, 6), after=WORDS + 8, most=0),
 )
@@ -133,7 +136,7 @@ def _exact(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def booted(boot: Boot, case: Moved, behind: int) -> Machine:
     """Return a board where SysTick comes so many cycles behind the beginning of the transfer."""
-    it = case.name[:5] if case.name.startswith("it") else ""
+    it = case.name.partition(",")[0] if case.name.startswith("it") else ""
     put, sp = (PUTS_NINES, STACK) if case.at == WORDS else ("", case.base)
     source = PROGRAM.format(
         at=case.at, base=case.base, sp=sp, load=1 + bool(it) + behind, it=it, code=case.code, put=put
@@ -156,6 +159,8 @@ def test_it_goes_on_with_the_word_at_which_it_was(boot: Boot, name: str) -> None
         state = case.registers[moved] << 12 if is_within and moved else 0
         if name.startswith("it") and behind < 1 + count:
             state = 0xE800 if "al" in name else 0x0800  # ITSTATE 1110 1000 or 0000 1000, its bits 7:2 at 15:10
+        if name.startswith("itttt"):
+            state = FOUR_IN_IT[max(0, behind - count)]
         assert xpsr & ICI_BITS == state, behind
         # chosen: a base that is written back holds its new value from the first word stored, from the last word loaded.
         changed = case.after if moved == count or (moved and not case.is_load) else case.base

@@ -48,6 +48,13 @@ _PERIPHERALS = (
     0x4002_0014, 0x4002_2000, 0x4000_6C04, 0x4000_7000, 0x4000_7C00, 0x4001_5000, 0x4001_8000, 0x4001_37FC,
     0x4002_3FFC, 0x4000_2C00, 0x4001_081C,
 )  # fmt: skip
+#: What accesses of one block reach: registers that need their time or not, with a clock and without, no register, the
+#: system's registers, SRAM, bits of both.
+_MIXED = (
+    0x4001_0800, 0x4001_1008, 0x4001_0C00, 0x4000_3800, 0x4000_5400, 0x4000_0000, 0x4000_0020, 0x4001_3800, 0x4001_5000,
+    0x4001_8000, 0x4002_3000, 0x4002_1014, 0x4001_0408, 0xE000_E010, 0xE000_E100, 0xE000_ED18, 0xE000_1000, SCRATCH,
+    0x2200_0000 + 32 * (SCRATCH - 0x2000_0000), 0x4200_0000 + 32 * 0x1_080C, 0x4200_0000 + 32 * 0x1_0C0C,
+)  # fmt: skip
 #: What faults, or does for some of these bits of CCR and masks: (instructions, whether they leave the registers).
 _FAULTS = (
     "udf", ".half 0xF7F0, 0xA000", "mov32 r1, #0x60000000\nldr r0, [r1, #0]",
@@ -122,7 +129,7 @@ str r2, [r1, #0]
 class ProgramWriter:
     """Writes one program."""
 
-    def __init__(self, dice: random.Random) -> None:
+    def __init__(self, dice: random.Random, *, makes_accesses: bool = False) -> None:
         self._dice = dice
         self._stream = Stream(dice)
         self._labels = 0
@@ -134,6 +141,11 @@ class ProgramWriter:
             self.timer, self.calls, self.many_reads, self.priorities, self.returns, self.pin_modes,
             self.flash_write, self.narrow,
         )  # fmt: skip
+        if makes_accesses:
+            self._kinds = (
+                *(self.mixed,) * 8, self.several, self.conditional, self.ambiguous,
+                self.bits, self.narrow, self.many_reads, self.flash_write, self.tick, self.timer, self.unprivileged,
+            )  # fmt: skip
 
     def written(self, *, has_all_faults: bool = False) -> str:
         """Return the whole program: set up, pieces or each fault once, handlers."""
@@ -152,6 +164,7 @@ class ProgramWriter:
             f"fault: {_FAULT}svc_handler: {_NOTE}movs r0, #0\nmsr control, r0\nbx lr\n"
             f"irq: {_INTERRUPT}{other}bx lr\nsystick: {_NOTE}mov32 r1, #{NOTES + 8}\nldr r2, [r1, #0]\nadds r2, #1\n"
             f"str r2, [r1, #0]\nbx lr\npendsv: push {{r4, lr}}\n{_NOTE}{self.peripheral()}pop {{r4, pc}}\n"
+            "room: nop\n"
         )  # fmt: skip
 
     def _label(self) -> str:
@@ -232,6 +245,19 @@ class ProgramWriter:
             f"mov32 r1, #{self._dice.choice(_PERIPHERALS)}\ncmp r4, #{self._dice.randrange(2)}\n"
             f"{self._halves(halves)}adds r5, r5, r2\n"
         )
+
+    def mixed(self) -> str:
+        """Make several accesses in a row, through three registers; and again, when what is warned of once is known."""
+        first, other = self._dice.sample(_MIXED, 2)
+        bases, label = enumerate((first, other, first + self._dice.choice((0, 4, 8))), 1), self._label()
+        lines = f"movs r0, #{self._dice.randrange(2, 5)}\nmov r12, r0\n{label}: "
+        lines += "".join(f"mov32 r{n}, #{base}\n" for n, base in bases)
+        for _ in range(self._dice.randrange(4, 9)):
+            name = self._dice.choice(
+                ("ldr r0", "ldr r6", "ldrh r0", "ldrb r6", "str r4", "str r5", "str r7", "strh r4", "strb r5")
+            )
+            lines += f"{name}, [r{self._dice.randrange(1, 4)}, #{self._dice.choice((0, 4, 4, 8))}]\n"
+        return f"{lines}adds r4, r4, r0\nadds r5, r5, r6\nmov r0, r12\nsubs r0, #1\nmov r12, r0\nbne {label}\n"
 
     def ambiguous(self) -> str:
         """Have two accesses of a block that look alike, with another base between."""
@@ -333,6 +359,9 @@ class ProgramWriter:
         word = self._dice.choice(
             ("wfi", "wfe", "sev\nwfe", "wfi.w", "wfe.w", "sev\nwfe.w\nwfe", "yield", "isb", "dsb\nwfi")
         )
+        if not self._dice.randrange(3):  # what is pending is an event, which no mask keeps off (SEVONPEND)
+            event = "mov32 r1, #0xE000ED10\nmovs r0, #16\nstr r0, [r1, #0]\ncpsid i\n"
+            return f"{event}{self.tick()}wfe\nwfe\nadds r4, #1\ncpsie i\n"
         return f"{self.tick()}{word}\nadds r4, #1\n"
 
     def delay(self) -> str:
@@ -396,15 +425,16 @@ class ProgramWriter:
         )
 
     def flash_write(self) -> str:
-        """Program halfwords of the flash, with waiting and without; some of them twice, or locked."""
+        """Program halfwords behind the program or elsewhere, with waiting and without; some twice, or locked."""
         lines = (
             "mov32 r1, #0x40022000\nmov32 r0, #0x45670123\nstr r0, [r1, #4]\nmov32 r0, #0xCDEF89AB\nstr r0, [r1, #4]\n"
         )
         lines += f"movs r0, #{self._dice.choice((1, 1, 1, 0))}\nstr r0, [r1, #16]\n"
         for _ in range(self._dice.randrange(1, 3)):
             name, wait = self._dice.choice(("strh", "strh", "str", "strb")), self._label()
+            place = self._dice.choice((FLASH + 0x1FF10, "room"))
             lines += (
-                f"mov32 r3, #{FLASH + 0xFF10 + 4 * self._dice.randrange(4)}\n"
+                f"mov32 r3, #{place}\nadds r3, #{2 + 2 * self._dice.randrange(4)}\n"
                 f"movs r0, #{self._dice.randrange(256)}\n{name} r0, [r3, #0]\n"
             )
             if self._dice.randrange(3):
@@ -457,14 +487,20 @@ class ProgramWriter:
         """Do something without privilege, and come back by SVC."""
         inside = self._guarded(
             self._dice.choice(
-                (self.system, self.system_read, self.peripheral, self.masks, self.request, self.bits, self.sleep)
+                (self.system, self.system_read, self.peripheral, self.masks, self.request, self.bits, self.sleep,
+                 self.user_request)
             )()
-        )
+        )  # fmt: skip
         control, back = self._dice.choice((1, 1, 3)), self._guarded("svc #7\n")
+        settings = f"mov32 r1, #0xE000ED14\nmov32 r0, #{self._dice.choice((0x202, 0x200))}\nstr r0, [r1, #0]\n"
         return (
-            f"cpsie i\ncpsie f\nmov32 r0, #{PROCESS_STACK}\nmsr psp, r0\nmovs r0, #0\nmsr basepri, r0\n"
+            f"{settings}cpsie i\ncpsie f\nmov32 r0, #{PROCESS_STACK}\nmsr psp, r0\nmovs r0, #0\nmsr basepri, r0\n"
             f"movs r0, #{control}\nmsr control, r0\nisb\n{inside}{back}movs r0, #0\nmsr control, r0\n"
         )
+
+    def user_request(self) -> str:
+        """Make an interrupt pending by its number, as a thread without privilege may where USERSETMPEND is set."""
+        return f"mov32 r1, #0xE000EF00\nmovs r2, #{self._dice.randrange(44)}\nstr r2, [r1, #0]\nldr r0, [r1, #0]\n"
 
     def sram_code(self) -> str:
         """Call code in SRAM, change it, and call it again."""
@@ -557,13 +593,19 @@ class ProgramWriter:
         return f"{self.tick()}.half 0xFBA4, 0x2305\n" + "udiv r0, r4, r5\nmla r2, r4, r5, r6\n" * 6
 
 
-def assembled(programs: int, seed: str) -> tuple[Image, list[tuple[int, int]]]:
-    """Return an image with programs, and of each where its vectors are and where it ends."""
+def assembled(programs: int, seed: str, *, makes_accesses: bool = False) -> tuple[Image, list[tuple[int, int]]]:
+    """Return an image with programs, and of each where its vectors are and where it ends.
+
+    Args:
+        programs: How many.
+        seed: Names what is drawn.
+        makes_accesses: Whether all that they do is accesses, and not all that a program may do.
+    """
     data, places = bytearray(), []
     for number in range(programs):
         base = FLASH + ROOM * number
-        writer = ProgramWriter(random.Random(f"{seed} {number}"))
-        made = Assembler(writer.written(has_all_faults=number == 0), base + CODE_AT)
+        writer = ProgramWriter(random.Random(f"{seed} {number}"), makes_accesses=makes_accesses)
+        made = Assembler(writer.written(has_all_faults=number == 0 and not makes_accesses), base + CODE_AT)
         label = made.labels
         table = [STACK, label["start"] | 1] + [label["irq"] | 1] * (EXCEPTIONS - 2)
         for exception, name in (

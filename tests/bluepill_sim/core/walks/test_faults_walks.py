@@ -1,7 +1,8 @@
 """Faults of every kind, where handlers are there, missing or faulty themselves, on every core, as approved.
 
 Each program sets up what faults go by (SHCSR, CCR, priorities, masks, privilege, stack, vector table), makes one or two
-faults or calls, and has handlers that return, skip what failed, fault, or return wrongly.
+faults or calls, and has handlers that return, skip what failed, fault, or return wrongly. In every third a debugger
+halts the core at a BKPT.
 """
 
 import random
@@ -14,7 +15,7 @@ from bluepill_sim.extension.library import core_chosen
 from tests.bluepill_sim.core.test_faults import CASES, store
 from tests.bluepill_sim.core.walks.test_program_walks import _shown
 from tests.bluepill_sim.machine import CODE, FLASH, STACK, VECTORS, Assembler, Machine
-from tests.tools.suite.approved import judge_alike, judge_of
+from tests.tools.suite.approved import judge_alike, judge_of, said
 
 PROGRAMS, SPANS_NS = 48, (1_500, 9_000, 60_000)
 #: The cores that go from block to block, and so show the same.
@@ -124,10 +125,11 @@ def _episodes(core: str, _: random.Random) -> Iterator[str]:
         Inspector(board).program_flash(0, data)
         board.chip.memory.write(_SHORT_TABLE, data[:48])
         board.chip.engine.jump(CODE | 1)
+        board.chip.processor.halts_on_bkpt = number % 3 == 0
         lines = [words]
         for span in SPANS_NS:
-            board.advance_to(board.now_ns + span)
-            lines.append(f"{_shown(board)} {board.fault} {board.warnings} {board.verdict}")
+            reached = board.advance_to(board.now_ns + span)
+            lines.append(f"{said(reached)} {_shown(board)} {board.fault} {board.warnings} {board.verdict}")
         yield "\n".join(lines)
 
 

@@ -34,7 +34,7 @@ _FUNCTIONS = (0, 4, 5, 6, 7, 0x84, 0x104, 1)
 
 @cache
 def _image() -> tuple[Image, list[tuple[int, int]]]:
-    return assembled(PROGRAMS, "points")
+    return assembled(PROGRAMS, "break points")
 
 
 def _code(board: BluePill, base: int, dice: random.Random) -> int:

@@ -2,7 +2,6 @@
 
 import random
 import zlib
-from collections import Counter
 from collections.abc import Iterator
 from functools import cache, partial
 
@@ -10,16 +9,12 @@ from bluepill_sim import BluePill
 from bluepill_sim.core import Reg
 from bluepill_sim.core.unicorn_core import GENERAL
 from bluepill_sim.extension.library import core_chosen
-from bluepill_sim.native.engine import NativeEngine
 from bluepill_sim.program.image import Image
-from tests.bluepill_sim.core.walks.counted_calls import counted_calls
 from tests.bluepill_sim.core.walks.programs import assembled
 from tests.bluepill_sim.machine import STACK, listen
 from tests.tools.suite.approved import judge_alike, judge_of
 
 PROGRAMS, SLICES = 30, 40
-#: Programs of which it is counted, too, what C leaves to Python.
-COUNTED = range(0, PROGRAMS, 2)
 #: Time between two looks, ns.
 SPANS_NS = (1, 125, 1_000, 4_000, 20_000, 60_000)
 #: The cores that go from block to block, and so show the same.
@@ -34,13 +29,14 @@ _NVIC = ("pending", "active", "enabled", "levels", "priority_grouping")
 
 
 @cache
-def _image() -> tuple[Image, list[tuple[int, int]]]:
+def image() -> tuple[Image, list[tuple[int, int]]]:
+    """Return the programs."""
     return assembled(PROGRAMS, "bg")
 
 
 def _board(core: str) -> BluePill:
     with core_chosen(core):
-        return BluePill(_image()[0])
+        return BluePill(image()[0])
 
 
 def _request(board: BluePill, line: int, *, stays: bool) -> None:
@@ -50,6 +46,14 @@ def _request(board: BluePill, line: int, *, stays: bool) -> None:
     nvic.set_level(line, True)
     board.chip.processor.pending_changed()
     nvic.set_level(line, stays)
+
+
+def _raise(board: BluePill, lines: list[int]) -> None:
+    """Have devices raise interrupts at once, and take them back."""
+    board.chip.processor.nvic.enabled |= sum(1 << line for line in lines)
+    for level in (True, False):
+        for line in lines:
+            board.chip.fabric.set_line(line, level)
 
 
 def _shown(board: BluePill) -> str:
@@ -77,12 +81,12 @@ def _episodes(core: str, _: random.Random) -> Iterator[str]:
     """Yield what each program shows, in its turn on one board."""
     board = _board(core)
     fresh = board.snapshot()
-    for number, (base, stop) in enumerate(_image()[1]):
+    for number, (base, stop) in enumerate(image()[1]):
         board.restore(fresh)
-        yield "\n".join([f"program {number}", *_lines(board, number, base, stop, is_exact=core == "exact")])
+        yield "\n".join([f"program {number}", *lines_of(board, number, base, stop, is_exact=core == "exact")])
 
 
-def _lines(board: BluePill, number: int, base: int, stop: int, *, is_exact: bool) -> Iterator[str]:
+def lines_of(board: BluePill, number: int, base: int, stop: int, *, is_exact: bool) -> Iterator[str]:
     """Yield what a program shows from time to time; some are watched, recorded, saved and restored."""
     dice, chip = random.Random(f"slices {number}"), board.chip
     edges: list[tuple[str, str, int]] = []
@@ -101,6 +105,8 @@ def _lines(board: BluePill, number: int, base: int, stop: int, *, is_exact: bool
         board.pin("PA0").drive(bool(turn % 2))
         if dice.random() < 0.15:
             _request(board, dice.choice((1, 5, 47, 48, 59)), stays=number > 0 and dice.random() < 0.1)
+        if dice.random() < 0.1:
+            _raise(board, dice.sample((0, 6, 11, 31, 42), dice.randrange(1, 4)))
         if turn == SLICES // 3:
             saved = board.snapshot()
             board.advance_to(board.now_ns + 2_000)
@@ -117,29 +123,6 @@ def _lines(board: BluePill, number: int, base: int, stop: int, *, is_exact: bool
     yield f"{rows} {edges} {[str(warning) for warning in board.warnings]} {board.fault!r}"
 
 
-def _asked(core: str, _: random.Random) -> Iterator[str]:
-    """Yield how often C calls Python, by what for, while programs run; rows of blocks, and the last access at its time.
-
-    What it can answer itself it does; of a loop that waits it writes the last rows alone, however long it goes round.
-    """
-    counts = Counter[str]()
-    with counted_calls(counts):
-        board = _board(core)
-    fresh = board.snapshot()
-    assert isinstance(board.chip.engine, NativeEngine)
-    for number in COUNTED:
-        board.restore(fresh)
-        lines = [f"program {number}"]
-        for _line in _lines(board, number, *_image()[1][number], is_exact=core == "exact"):
-            shared = board.chip.engine.shared
-            accesses = f"{shared.access_cycle} {shared.access_pc:x} {shared.exact_stops}"
-            lines.append(f"{shared.logged} {accesses} {sorted(counts.items())}")
-            counts.clear()
-        yield "\n".join(lines)
-
-
-TRACES = {core: partial(_episodes, core) for core in (*CORES, "exact")} | {
-    f"{core} asked": partial(_asked, core) for core in ("native", "own")
-}
+TRACES = {core: partial(_episodes, core) for core in (*CORES, "exact")}
 test_a_walk_shows_what_was_approved = judge_of(__file__, TRACES)
 test_cores_that_go_from_block_to_block_show_the_same = judge_alike(__file__, CORES)

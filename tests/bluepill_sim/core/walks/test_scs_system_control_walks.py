@@ -15,7 +15,7 @@ from bluepill_sim.extension.layout import SHARED
 from tests.bluepill_sim.machine import Machine
 from tests.tools.suite.approved import judge_of
 
-STEPS = 900
+STEPS = 1100
 #: Where there is a register, or none: from, up to.
 RANGES = (
     (0xE000_0000, 0xE000_0090), (0xE000_0DFC, 0xE000_0E48), (0xE000_0E7C, 0xE000_0E88), (0xE000_0FA8, 0xE000_1068),
@@ -33,18 +33,22 @@ _SHOWN = (
     0xE000_E400, 0xE000_E428, 0xE000_ED04, 0xE000_ED08, 0xE000_ED0C, 0xE000_ED10, 0xE000_ED14, 0xE000_ED18,
     0xE000_ED20, 0xE000_ED24, 0xE000_ED28, 0xE000_EDFC, 0xE004_2004,
 )  # fmt: skip
+#: What threads without privilege may write, or not: at both ends of each eight stimulus ports, behind them, and STIR.
+_OPEN = (*(offset + end for offset in range(0, 0x80, 0x20) for end in (0, 0x1C)), 0x80, 0xE400, 0xEF00)
 #: Addresses of the host, and what only a run sets.
 _OWN = {"sram", "flash", "scratch", "fault", "last", "logged", "exact_stops", "is_python"}
 _AIRCR, _DEMCR, _LAR, _TCR, _TER, _STIR = 0xE000_ED0C, 0xE000_EDFC, 0xE000_0FB0, 0xE000_0E80, 0xE000_0E00, 0xE000_EF00
 #: Written now and then, since much hangs on them.
 _KEYS = (
+    (0xE000_0E40, 5), (0xE000_0E40, 8), (0xE000_0E40, 2), (0xE000_ED14, 0x202),
     (_TCR, 0), (_TER, 0), (_TER, 2), (0xE000_0004, 3), (0xE000_0008, 4),
     (0xE000_0000, 0x1234_5678), (0xE000_0004, 0xFFFF_FFFF), (0xE000_007C, 1),
     (_LAR, 0xC5AC_CE55), (_LAR, 1), (_DEMCR, 0x0107_0000), (_DEMCR, 0), (_AIRCR, 0x05FA_0300),
     (_AIRCR, 0x05FA_0702), (_AIRCR, 0x05FA_0000), (_AIRCR, 0x1234_0700), (_TCR, 1), (_TER, 0xFFFF_FFFF),
     (0xE000_E010, 7), (0xE000_E010, 3), (0xE000_E014, 99), (0xE000_E014, 0), (0xE000_E018, 5),
     (0xE000_1000, 1), (0xE000_2000, 3), (0xE000_2000, 1), (0xE000_E100, 0xFFFF_FFFF), (0xE000_EF00, 42),
-    (0xE000_EF00, 43), (0xE000_EF00, 0x22A),
+    (0xE000_EF00, 43), (0xE000_EF00, 0x22A), (0xE000_E280, 0xFFFF_FFFF), (0xE000_E284, 0xFFFF_FFFF),
+    (0xE000_E280, 0xFFFF_FFFF), (0xE000_E200, 0x8000_0003), (0xE000_E204, 0x401), (0xE000_E180, 0x8000_0001),
 )  # fmt: skip
 
 
@@ -78,7 +82,8 @@ class _Bus:
 
     def shown(self) -> str:
         """Return what reads give that change nothing."""
-        return " ".join(map(self.read, _SHOWN))
+        is_open = "".join(f"{self.system.is_open_to_all(offset):d}" for offset in _OPEN)
+        return f"{' '.join(map(self.read, _SHOWN))} {is_open}"
 
     def write(self, address: int, size: int, value: int) -> str:
         """Return whether a write is known."""
@@ -93,6 +98,13 @@ class _Bus:
         elif not level:
             nvic.deactivate(16 + irq)
         return f"irq {irq} {level} {nvic.first_pending()} {nvic.active_priority()} {nvic.deliverable():x}"
+
+    def serve(self, dice: random.Random) -> str:
+        """Begin or end the handler of an exception of the core, or make it pending."""
+        nvic, number = self.board.chip.processor.nvic, dice.choice((2, 3, 4, 5, 6, 11, 12, 14, 15))
+        act = dice.choice((nvic.activate, nvic.activate, nvic.deactivate, nvic.pend))
+        act(number)
+        return f"{act.__name__} {number} {nvic.first_pending()} {nvic.active_priority()}"
 
     def wait(self, cycles: int) -> str:
         """Let time pass."""
@@ -155,7 +167,8 @@ def _walk(_: random.Random) -> Iterator[str]:
         elif kind < 8:
             done = f"{address:x}/{size} {bus.read(address, size)}"
         else:
-            done = bus.line(dice) if kind < 9 else bus.wait(dice.choice((1, 7, 50, 100, 1_000)))
+            act = dice.choice((bus.line, bus.serve)) if kind < 9 else None
+            done = act(dice) if act is not None else bus.wait(dice.choice((1, 7, 50, 100, 1_000)))
         yield f"{done} {bus.changed()}\n{bus.shown()} {bus.changed()}"
     for act in (bus.system.enable_trace, bus.system.reset, bus.system.lose_power):
         act()

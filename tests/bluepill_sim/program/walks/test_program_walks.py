@@ -113,6 +113,17 @@ def wide(draw: random.Random) -> Iterator[str]:
     yield " ".join(str(expanded(field)) for field in range(0x1000))
 
 
+def unsized(_draw: random.Random) -> Iterator[str]:
+    """Yield where functions end whose sizes no file says, or says of some."""
+    data = struct.pack("<II", SRAM_BASE + SRAM_BYTES, HERE | 1).ljust(0x400, b"\0")
+    for sizes in ((0, 0, 0), (0, 4, 0), (4, 0, 6), (0, 0, 8)):
+        rows = zip(("one", "two", "three"), (HERE, HERE + 0x10, HERE + 0x30), sizes, strict=True)
+        symbols = SymbolTable(tuple(Symbol(name, at, size, is_function=True) for name, at, size in rows))
+        functions = FunctionTable(Image("unsized", ((FLASH_BASE, data),), symbols))
+        edges = sorted({at + n for at in (*functions._addresses, HERE + 0x1030) for n in (-1, 0, 1, 3, 4, 5, 6, 7, 8)})
+        yield said([(at, functions.name(at), functions.start_of(at), functions.end_of(at)) for at in edges])
+
+
 def files(draw: random.Random) -> Iterator[str]:
     for path in PROGRAMS:
         image = load_image(path)
@@ -675,6 +686,7 @@ TRACES: dict[str, Trace] = {
     "narrow": narrow,
     "wide": wide,
     "files": files,
+    "unsized": unsized,
     "tables": tables,
     "programs": programs,
     "headers": headers,
