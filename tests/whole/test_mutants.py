@@ -547,6 +547,8 @@ def test_an_endless_loop_is_noticed_by_its_time_where_the_sound_program_is_soon_
     found = judge.judged(loop, ["test_spin.py"])
     assert (found.verdict, found.by) == (MutantStatus.TIMED_OUT, "test_spin.py::test_spin")
     assert judge.judged(loop, ["test_slow.py"]).verdict is MutantStatus.UNDECIDED  # it lasts long without a change
+    found = judge.judged(loop, ["test_slow.py", "test_spin.py"])
+    assert (found.verdict, found.by) == (MutantStatus.TIMED_OUT, "test_spin.py::test_spin"), "the others are asked"
 
 
 @pytest.mark.slow
