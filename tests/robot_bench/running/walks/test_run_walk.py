@@ -225,6 +225,11 @@ def together(_draw: Random) -> Iterator[str]:
     yield said(first.judge())
     for bench in benches.values():
         yield from shown_lines(bench)
+    for bench in (first, second):
+        run_of(bench).ends_at = ends = first.end - SLICE_NS  # its scenario ends it, and the other one's does not
+        for at in (ends - 1, ends, ends + 1):
+            yield said([[run_of(one).ended(at), run_of(one).end, run_of(one).whole_end] for one in (first, second)])
+        run_of(bench).ends_at = None
 
 
 #: What is asked of a bench, one after the other: the method, its arguments.
