@@ -34,6 +34,7 @@ from robot_bench.scenario.loading import load_scenario
 from robot_bench.scenario.scenario import Scenario
 from simbase.errors import P2osError
 from simbase.timing import NS_PER_MS
+from tests.robot_bench.firmware import thumb
 from tests.robot_bench.firmware.hurried import hurried
 from tests.tools.suite.acted import Acted, taken
 from tests.tools.suite.approved import Trace, judge_of, said, tried
@@ -196,6 +197,14 @@ def runs(_draw: Random) -> Iterator[str]:
             )
             yield said(outcome_of(record)).replace(name, "HERE")[:2000]
             yield said([pins_of(scenario), sorted(cut_wires(scenario, load_pinout()))])
+        for program in ("SPIN", "NOWHERE", "DIVIDE", "OVERFLOW", "SLEEP"):
+            file = Path(name, f"{program}.bin")
+            file.write_bytes(getattr(thumb, program))
+            short = load_scenario("dodge", firmware=file).with_options(body="kinematic", duration_s=0.02)
+            bench = Bench(replace(short, goals=()))
+            bench.run_until(bench.end)
+            yield said([program, bench.now, bench.chip.verdict, bench.chip.has_died, run.notes(bench, bench.end, None)])
+            yield said([bench.judge(), *bench.last_events(3)]).replace(name, "HERE")
 
 
 def together(_draw: Random) -> Iterator[str]:
