@@ -43,6 +43,19 @@ def faced(draw: random.Random) -> Iterator[str]:
                     )
 
 
+def levels(draw: random.Random) -> Iterator[str]:
+    """Ask of robots at several heights which of them is near, seen, and in the way."""
+    for height_m in (0.05, 0.15, 0.19, 0.2, 0.22, 0.24, 0.245, 0.26, 0.5):
+        stage = Obstacle(
+            name="stage", x_m=1.5, y_m=0, length_m=2, width_m=2, height_m=height_m, kind=ObstacleKind.FLOOR
+        )
+        for model in (P2DX, PATROL):
+            for there in (Pose(1.2, 0.0, math.pi, height_m), Pose(1.2, 0.6, 0.0, height_m)):
+                one, other = make_scene("kinematic", world(stage), [P2DX, model], [Pose(0, 0, 0), there]).bodies
+                seen = [a for a in range(8) if one.sees(a, other, 3) is not None]
+                yield said((height_m, other.state.z_m, one.clearance(), other.clearance(), seen, one.ranges(range(8))))
+
+
 def placed(draw: random.Random) -> Iterator[str]:
     """Put robots where they may stand, and where they may not."""
     slope = Obstacle(name="ramp", x_m=-3, y_m=0, length_m=1, width_m=1, height_m=0.2, kind=ObstacleKind.RAMP)
@@ -144,5 +157,5 @@ def blocked(draw: random.Random) -> Iterator[str]:
     )
 
 
-TRACES: dict[str, Trace] = {each.__name__: each for each in (faced, placed, pushed, blocked)}
+TRACES: dict[str, Trace] = {each.__name__: each for each in (faced, levels, placed, pushed, blocked)}
 test_what_was_approved_is_shown = judge_of(__file__, TRACES)
