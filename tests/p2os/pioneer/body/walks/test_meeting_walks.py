@@ -3,11 +3,12 @@
 import math
 import random
 from collections.abc import Iterator
+from unittest.mock import patch
 
 from p2os.pioneer.body.contacts import APART_STEPS
 from p2os.pioneer.body.contract import BodyState
 from p2os.pioneer.body.factory import make_body, make_scene
-from p2os.pioneer.body.in_world import free_name
+from p2os.pioneer.body.in_world import StandingPose, free_name
 from p2os.pioneer.body.kinematic import KinematicBody
 from p2os.pioneer.world.model import Obstacle, ObstacleKind, Pose, Walk, World
 from p2os.robots.parameters import load_parameters
@@ -44,16 +45,21 @@ def faced(draw: random.Random) -> Iterator[str]:
 
 
 def levels(draw: random.Random) -> Iterator[str]:
-    """Ask of robots at several heights which of them is near, seen, and in the way."""
-    for height_m in (0.05, 0.15, 0.19, 0.2, 0.22, 0.24, 0.245, 0.26, 0.5):
-        stage = Obstacle(
-            name="stage", x_m=1.5, y_m=0, length_m=2, width_m=2, height_m=height_m, kind=ObstacleKind.FLOOR
-        )
-        for model in (P2DX, PATROL):
-            for there in (Pose(1.2, 0.0, math.pi, height_m), Pose(1.2, 0.6, 0.0, height_m)):
-                one, other = make_scene("kinematic", world(stage), [P2DX, model], [Pose(0, 0, 0), there]).bodies
-                seen = [a for a in range(8) if one.sees(a, other, 3) is not None]
-                yield said((height_m, other.state.z_m, one.clearance(), other.clearance(), seen, one.ranges(range(8))))
+    """Ask of robots whose floors lie at several heights which of them is near, and which echoes."""
+    plain = KinematicBody.standing_pose
+    for model in (P2DX, PATROL):
+        for there in (Pose(1.2, 0.0, math.pi), Pose(1.2, 0.6, 0.0)):
+            one, other = make_scene("kinematic", world(), [P2DX, model], [Pose(0, 0, 0), there]).bodies
+            for above_m in (0.0, 0.1, 0.15, 0.19, 0.2, 0.22, 0.24, 0.3, 0.5, 1.0):
+
+                def raised(body: object, which: object = other, above_m: float = above_m) -> StandingPose:
+                    x, y, turn, z = plain.fget(body)  # type: ignore[attr-defined]  # a property
+                    return StandingPose(x, y, turn, z + above_m * (body is which))
+
+                with patch.object(KinematicBody, "standing_pose", property(raised)):
+                    yield said(
+                        (above_m, one.clearance(), other.clearance(), one.ranges(range(8)), other.ranges((3, 4)))
+                    )
 
 
 def placed(draw: random.Random) -> Iterator[str]:
