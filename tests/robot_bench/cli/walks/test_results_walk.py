@@ -9,6 +9,7 @@ from types import SimpleNamespace
 from typing import Any
 from unittest import mock
 
+from p2os.cli.main import run as p2os
 from robot_bench.cli import board, sweep, table
 from robot_bench.cli import run as run_verb
 from robot_bench.cli.campaigns import mutate, shrink
@@ -193,6 +194,42 @@ def studies(draw: Random) -> Iterator[str]:
     yield said(draw.random())
 
 
+def shrunk(_draw: Random) -> Iterator[str]:
+    """Carry out the verb that shrinks, whose work is only noted: what it asks for, prints and ends with."""
+    calls: list[str] = []
+    failure = SimpleNamespace(way="no_collision: front", says="it hit", at_ns=1_500_000_000)
+    small: Any = SimpleNamespace(
+        failure=failure, things_before=9, things_after=2, trials=33, is_complete=True,
+        trial=SimpleNamespace(trusted=()),
+    )  # fmt: skip
+
+    def shrink_it(trial: Any, *, quick: object, budget: int, judge: Any) -> object:
+        calls.append(said([trial.name, trial.seed, quick, budget, judge(trial, "way", 5)]))
+        return small
+
+    def failure_of(trial: Any, way: object, until_ns: object, look: Any) -> str:
+        calls.append(said([trial.name, way, until_ns, look() is None]))
+        return "failed"
+
+    with (
+        in_folder() as folder, mock.patch.object(shrink, "shrink", shrink_it),
+        mock.patch.object(shrink, "failure_of", failure_of), mock.patch.object(shrink, "keep") as keep,
+    ):  # fmt: skip
+        for confirmed in (True, False):
+            keep.side_effect = lambda *given, confirmed=confirmed: (
+                calls.append(said([given[1], str(given[2])])),
+                SimpleNamespace(
+                    scenario=Path("/k/s.toml"), test=Path("/k/t.py"), is_confirmed=confirmed, explained="why so",
+                    outcome=SimpleNamespace(sha256="0123456789abcdefgh"),
+                ),
+            )[1]  # fmt: skip
+            for words in ("dodge", "dodge --json --out there --quick", "dodge --budget 7 --seed 4 --goal no_collision"):
+                yield f"$ shrink {words}"
+                yield from (line.replace(str(folder), "HERE") for line in printed(p2os, ["shrink", *words.split()]))
+                yield said(calls)
+                calls.clear()
+
+
 SETTINGS: tuple[tuple[tuple[str, object], ...], ...] = (
     (),
     (("threshold_m", 0.4), ("start.x_m", 1)),
@@ -317,5 +354,5 @@ def validations(_draw: Random) -> Iterator[str]:
         yield said(reported)
 
 
-TRACES = {"tables": tables, "studies": studies, "sweeps": sweeps, "validations": validations}
+TRACES = {"tables": tables, "studies": studies, "shrunk": shrunk, "sweeps": sweeps, "validations": validations}
 test_what_verbs_make_of_results_is_what_was_approved = judge_of(__file__, TRACES)
