@@ -9,7 +9,10 @@ from types import SimpleNamespace
 from typing import Any
 from unittest import mock
 
+from bluepill_sim.board import BluePill
 from p2os.cli.main import run as p2os
+from robot_bench.campaign.variants.mutation.suite import Suite, SuiteRun
+from robot_bench.campaign.variants.mutation.trial import Fate, MutantResult
 from robot_bench.cli import board, sweep, table
 from robot_bench.cli import run as run_verb
 from robot_bench.cli.campaigns import mutate, shrink
@@ -216,18 +219,68 @@ def shrunk(_draw: Random) -> Iterator[str]:
         mock.patch.object(shrink, "failure_of", failure_of), mock.patch.object(shrink, "keep") as keep,
     ):  # fmt: skip
         for confirmed in (True, False):
-            keep.side_effect = lambda *given, confirmed=confirmed: (
-                calls.append(said([given[1], str(given[2])])),
-                SimpleNamespace(
-                    scenario=Path("/k/s.toml"), test=Path("/k/t.py"), is_confirmed=confirmed, explained="why so",
-                    outcome=SimpleNamespace(sha256="0123456789abcdefgh"),
-                ),
-            )[1]  # fmt: skip
+            keep.return_value = SimpleNamespace(
+                scenario=Path("/k/s.toml"), test=Path("/k/t.py"), is_confirmed=confirmed, explained="why so",
+                outcome=SimpleNamespace(sha256="0123456789abcdefgh"),
+            )  # fmt: skip
             for words in ("dodge", "dodge --json --out there --quick", "dodge --budget 7 --seed 4 --goal no_collision"):
                 yield f"$ shrink {words}"
                 yield from (line.replace(str(folder), "HERE") for line in printed(p2os, ["shrink", *words.split()]))
-                yield said(calls)
+                yield said([calls, keep.call_args.args[1:]])
                 calls.clear()
+
+
+MUTATED = (
+    "dodge", "dodge --json --junit r.xml", "dodge --sample 5 --seed 3 --write out -j 2", "dodge --only dodge_fsm.c",
+    "dodge --only nothing", "dodge --fail-under 99%", "dodge --sample 5 --fail-under 10%", "dodge motors --only main",
+    "dodge tests.py", "tests.py --sample 4", "dodge tests.py --json --sample 3 --seed 1", "dodge --write taken/x",
+    "dodge --junit none/r.xml",
+)  # fmt: skip
+
+
+def mutated(draw: Random) -> Iterator[str]:
+    """Carry out the verb that changes programs, whose runs are made up: what is tried, told, written and ended with."""
+    calls: list[str] = []
+    firmware = load_scenario("dodge").firmware
+    first = BluePill(firmware).pc
+    ran = dict.fromkeys(range(first, first + 40, 2), 0)
+
+    def in_processes(job: Any, count: int, *, at_once: int, on_done: Any, raise_if_interrupted: Any) -> bool:
+        calls.append(said([count, at_once]))
+        for number in range(count):
+            on_done(number, job(number, raise_if_interrupted) if draw.random() < 0.9 else {
+                "failures": draw.choice((["killed", "x"], [INTERRUPTED], ["ended by SIGXCPU"]))})  # fmt: skip
+        return draw.random() < 0.8
+
+    def come_to(mutant: Any, bases: Any, _clock: object, look: Any) -> MutantResult:
+        calls.append(said([f"{mutant.address:x}", len(bases), look() is None]))
+        return MutantResult(draw.choice([*Fate]), "dodge", "it did", draw.choice((0, 1_500_000_000)))
+
+    def by_tests(suite: Suite, mutant: Any, limit_s: int) -> MutantResult:
+        calls.append(said([len(suite.base.addresses), f"{mutant.address:x}", limit_s]))
+        return MutantResult(draw.choice([*Fate]), "tests.py", "test_b")
+
+    suites = iter(SuiteRun(**one) for one in (
+        {"addresses": {*ran}, "sha256": "ab", "cpu_s": 0.5}, {"failed": "test_a", "sha256": "ab"}, {"sha256": "ab"},
+    ) * 9)  # fmt: skip
+    with (
+        in_folder() as folder, mock.patch.object(mutate, "run_in_processes", in_processes),
+        mock.patch.object(mutate, "base_run", return_value=SimpleNamespace(first_ns=ran)),
+        mock.patch.object(mutate, "try_mutant", come_to), mock.patch.object(mutate, "load_pytest"),
+        mock.patch.object(mutate, "run_suite", side_effect=suites), mock.patch.object(mutate, "core_count", int),
+        mock.patch.object(Suite, "try_mutant", by_tests),
+    ):  # fmt: skip
+        Path("tests.py").write_text("", encoding="utf-8")
+        Path("taken").write_text("", encoding="utf-8")
+        for words in MUTATED:
+            yield f"$ mutate {words}"
+            for line in printed(p2os, ["mutate", str(firmware), *words.split()]):
+                yield line.replace(str(folder), "HERE").replace(str(firmware.parent), "FIRMWARE")
+            yield said(calls)
+            calls.clear()
+            for made in sorted(path for path in folder.rglob("*") if path.suffix in {".xml", ".elf", ".bin"}):
+                yield made.name if made.suffix != ".xml" else made.read_text(encoding="utf-8")
+                made.unlink()
 
 
 SETTINGS: tuple[tuple[tuple[str, object], ...], ...] = (
@@ -354,5 +407,12 @@ def validations(_draw: Random) -> Iterator[str]:
         yield said(reported)
 
 
-TRACES = {"tables": tables, "studies": studies, "shrunk": shrunk, "sweeps": sweeps, "validations": validations}
+TRACES = {
+    "tables": tables,
+    "studies": studies,
+    "shrunk": shrunk,
+    "mutated": mutated,
+    "sweeps": sweeps,
+    "validations": validations,
+}
 test_what_verbs_make_of_results_is_what_was_approved = judge_of(__file__, TRACES)
