@@ -283,6 +283,48 @@ def mutated(draw: Random) -> Iterator[str]:
                 made.unlink()
 
 
+ALONE = "dodge --trajectories 0 --vary threshold_m=0.4..0.8"
+VARIED = (
+    ALONE, f"{ALONE} --steps 3 --json", f"{ALONE} --vary start.x_m=-0.5..0.5 --steps 3 --outcome path_m",
+    f"{ALONE} --seeds 0-2 --steps 2 --set start.y_m=0.1", f"{ALONE} --body kinematic --duration 2s --steps 2 -j 3",
+    f"{ALONE} --outcome none", f"{ALONE} --steps 2 --picture a.png", "dodge", "dodge --trajectories 0 --steps 1",
+)  # fmt: skip
+
+
+def varied(draw: Random) -> Iterator[str]:
+    """Carry out the verb that varies scenarios, whose runs are made up: which are asked for, and what they come to."""
+    calls: list[str] = []
+    dodge = load_scenario("dodge")
+
+    def load(name: str, *, settings: Any, **named: Any) -> Scenario:
+        calls.append(said([name, settings, named["set_by"]]))
+        return replace(dodge, name=str(dict(settings).get("threshold_m", 0.6)))  # by which a run is known
+
+    def outcomes(scenario: Scenario, look: Any) -> dict[str, float]:
+        look(5)
+        calls.append(said([scenario.name, scenario.seed, scenario.body == "kinematic", scenario.duration_ns]))
+        return {"path_m": 2 * float(scenario.name) + 0.01 * scenario.seed, "goal 1: 1 m": 1 - float(scenario.name) ** 2}
+
+    def in_processes(job: Any, count: int, *, at_once: int, on_done: Any, raise_if_interrupted: Any) -> bool:
+        calls.append(said([count, at_once]))
+        for number in reversed(range(count)):
+            on_done(number, job(number, raise_if_interrupted))
+        return draw.random() < 0.9
+
+    with (
+        in_folder(), mock.patch.object(sensitivity, "load_scenario", load),
+        mock.patch("robot_bench.experiments.sensitivity.outcomes_of", outcomes),
+        mock.patch.object(sensitivity, "run_in_processes", in_processes), mock.patch.object(sensitivity, "require"),
+        mock.patch.object(sensitivity, "core_count", int), mock.patch.object(sensitivity, "load_once"),
+        mock.patch.object(sensitivity, "_draw", lambda *given: calls.append(said(given))),
+    ):  # fmt: skip
+        for words in VARIED:
+            yield f"$ sensitivity {words}"
+            yield from printed(p2os, ["sensitivity", *words.split()])
+            yield said(calls)
+            calls.clear()
+
+
 SETTINGS: tuple[tuple[tuple[str, object], ...], ...] = (
     (),
     (("threshold_m", 0.4), ("start.x_m", 1)),
@@ -412,6 +454,7 @@ TRACES = {
     "studies": studies,
     "shrunk": shrunk,
     "mutated": mutated,
+    "varied": varied,
     "sweeps": sweeps,
     "validations": validations,
 }
