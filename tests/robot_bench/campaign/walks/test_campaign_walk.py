@@ -20,7 +20,7 @@ from pyarrow import parquet
 from p2os.pioneer.world import load_world
 from robot_bench.campaign import things
 from robot_bench.campaign import whole as whole_module
-from robot_bench.campaign.campaign_file import CampaignTable, campaign_schema, parse_campaign
+from robot_bench.campaign.campaign_file import CampaignTable, RunLimits, campaign_schema, parse_campaign
 from robot_bench.campaign.conduct import CampaignProgress
 from robot_bench.campaign.last_moment import LastMoment
 from robot_bench.campaign.margin import goal_margin, margin
@@ -33,6 +33,7 @@ from robot_bench.campaign.suggestion import suggested
 from robot_bench.campaign.trial import GoalResult, HullContact, Outcome, SeenSoFar, Trial, TrialVerdict, trial_of
 from robot_bench.campaign.variants import diversity
 from robot_bench.campaign.whole import begin, carry_out, points_of, resume
+from robot_bench.campaign.workers import processes
 from robot_bench.cli.campaigns import campaign as verb
 from robot_bench.events.kinds import Contact, Note, Pose, Text
 from robot_bench.scenario.loading import load_scenario
@@ -349,6 +350,32 @@ def _packed(file: Path, firmware: Path | None) -> object:
     return [found.name, found.seed, found.trusted, [(key, found.table[key]) for key in sorted(found.table)], files]
 
 
+def limited(_draw: Random) -> Iterator[str]:
+    """Do pieces of work within limits that are only noted: some need too much, some have a bug."""
+    calls: list[str] = []
+
+    def work(look: Any) -> Any:
+        look()
+        return Outcome(verdict=TrialVerdict.PASSED)
+
+    def greedy(_look: Any) -> Any:
+        raise MemoryError
+
+    def wrong(_look: Any) -> Any:
+        raise KeyError("no such thing")
+
+    with (
+        mock.patch.object(processes, "_limit", lambda *given: calls.append(said(given[1]))),
+        mock.patch.object(processes, "_cpu_s", return_value=7.2),
+        mock.patch.object(processes, "_mapped_bytes", return_value=1000),
+    ):
+        for limits in (RunLimits(), RunLimits(cpu_s=1.0, memory_mb=64), RunLimits(cpu_s=1.6), RunLimits(cpu_s=2.4)):
+            for one in (work, greedy, wrong):
+                found, is_sound = processes._limited(one, limits, lambda: calls.append("look"))
+                yield said([limits, is_sound, getattr(found, "failures", ()), calls])
+                calls.clear()
+
+
 def figures(draw: Random) -> Iterator[str]:
     """Work out margins, rates, and words of the journal and of Markdown."""
     for unit in ("m", "s", "deg", "°", "m/s", "m/s²", "J", "", "x"):
@@ -418,7 +445,8 @@ def drawn_things(draw: Random) -> Iterator[str]:
 
 
 TRACES: dict[str, Trace] = {
-    "files": files, "packed": packed, "figures": figures, "things": drawn_things, "seen": seen_so_far,
+    "files": files, "packed": packed, "limited": limited, "figures": figures, "things": drawn_things,
+    "seen": seen_so_far,
 }  # fmt: skip
 for _package in ("campaign", "campaign.reaching", "campaign.workers", "campaign.pages"):
     TRACES[f"declared in {_package}"] = declared_of(f"robot_bench.{_package}")
