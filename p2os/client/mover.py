@@ -480,8 +480,8 @@ class MotorState:
 
     def ask(self, *, on: bool, now: Nanos) -> bool:
         """Note what the program asks for; return whether ENABLE is to be sent now: the same again waits."""
-        is_same = self.are_on is on and self.taken_off is None
-        if is_same and self._sent is not None and self._sent[0] is on and now - self._sent[1] < ENABLE_EVERY_NS:
+        is_sent = self._sent is not None and self._sent[0] is on and now - self._sent[1] < ENABLE_EVERY_NS
+        if is_sent and self.taken_off is None:
             return False
         self.are_on, self.taken_off = on, None
         self._asked_at = now

@@ -80,9 +80,8 @@ def header_in(document: str) -> PageHeader:
     Raises:
         ValueError, TypeError, KeyError: It is none.
     """
-    _, begin, rest = document.partition(_HEADER)
-    text, end, _ = rest.partition("</script>")
-    if not begin or not end:
+    text, end, _ = document.partition(_HEADER)[2].partition("</script>")
+    if not end:
         raise ValueError("a document without a header")
     return cast("PageHeader", of_json(PageHeader, json.loads(text)))
 

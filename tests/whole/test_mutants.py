@@ -375,7 +375,10 @@ PROJECT = {
     "pyproject.toml": (
         "[tool.setuptools]\next-modules = []\n[tool.pytest.ini_options]\nmarkers = ['slow', 'soak', 'hardware']\n"
     ),
-    "conftest.py": "from hypothesis import settings\nsettings.register_profile('unshrunk')\n",
+    "conftest.py": (
+        "from hypothesis import settings\nsettings.register_profile('unshrunk')\n"
+        "def pytest_collection_modifyitems(items):\n    items.sort(key=lambda item: item.path)\n"
+    ),
     "test_far.py": (
         "from part import is_far\n"
         "def test_far():\n    assert is_far(11) and not is_far(2)\n"
@@ -547,13 +550,15 @@ def test_an_endless_loop_is_noticed_by_its_time_where_the_sound_program_is_soon_
     found = judge.judged(loop, ["test_spin.py"])
     assert (found.verdict, found.by) == (MutantStatus.TIMED_OUT, "test_spin.py::test_spin")
     assert judge.judged(loop, ["test_slow.py"]).verdict is MutantStatus.UNDECIDED  # it lasts long without a change
+    found = judge.judged(loop, ["test_slow.py", "test_spin.py"])
+    assert (found.verdict, found.by) == (MutantStatus.TIMED_OUT, "test_spin.py::test_spin"), "the others are asked"
 
 
 @pytest.mark.slow
 def test_no_other_test_begins_when_the_time_is_over(judge: Judge, monkeypatch: pytest.MonkeyPatch) -> None:
     boundary = of_part("if distance > 10:")
     monkeypatch.setattr("tools.mutants.judge.BEGIN_S", 0.0)
-    found = judge.judged(boundary, ["test_spin.py", "test_more.py"])  # one test runs at least
+    found = judge.judged(boundary, ["test_spin.py", "test_more.py"])  # one test runs, of the file that is named first
     assert found.verdict is MutantStatus.SURVIVED
 
 

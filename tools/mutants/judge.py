@@ -66,7 +66,7 @@ class MutantStatus(Enum):
     TIMED_OUT = "timed out"
     #: Every test passes.
     SURVIVED = "survived"
-    #: A test does not end in time, but on the sound program it is slow as well.
+    #: A test does not end in time, but on the sound program it is slow as well, and no other one fails.
     UNDECIDED = "undecided"
     #: There is no test that is near.
     UNTESTED = "untested"
@@ -137,34 +137,35 @@ class Judge:
                 continue
             one = self._asked(changed, asked, marked, budget_s)
             seconds += one.seconds
-            if one.verdict is not MutantStatus.UNTESTED:
-                found = one
-            if one.verdict not in {MutantStatus.UNTESTED, MutantStatus.SURVIVED}:
+            if one.verdict in NOTICED or found.verdict is not MutantStatus.UNDECIDED:
+                found = found if one.verdict is MutantStatus.UNTESTED else one
+            if one.verdict in NOTICED:
                 break
         return replace(found, seconds=seconds)
 
     def _asked(self, changed: dict[str, bytes], files: Sequence[str], marked: str, budget_s: float) -> MutantOutcome:
-        """Return what some files of tests say, with what fails without a change left out."""
-        seconds = 0.0
+        """Return what some files of tests say, with what fails or is too slow without a change left out."""
+        seconds, slow = 0.0, list[str]()
         for _ in range(_MOST_LEFT_OUT):
             with self._tree.holding(changed):
-                run = self._run(files, marked, *self._left_out(files), budget_s=budget_s)
+                run = self._run(files, marked, *self._left_out(files, slow), budget_s=budget_s)
             seconds += run.seconds
             if marked is SHORT:
                 self._lasted(run.report.files)
             if run.code in {0, _NO_TESTS} or run.report.is_stopped:
                 verdict = MutantStatus.UNTESTED if run.code == _NO_TESTS else MutantStatus.SURVIVED
-                return MutantOutcome(verdict=verdict, seconds=seconds)
+                verdict = MutantStatus.UNDECIDED if slow else verdict
+                return MutantOutcome(verdict=verdict, by=slow[0] if slow else "", seconds=seconds)
             test = run.test or files[0]
             sound_s = self.sound_s(test)
             if sound_s is None:
                 print(f"\rmutants: left out, for it fails without a change: {test}", file=sys.stderr)
             elif run.code is not None:
                 return MutantOutcome(verdict=MutantStatus.NOTICED, by=test, seconds=seconds)
+            elif sound_s <= _limit_s(marked) * SOUND_PART:
+                return MutantOutcome(verdict=MutantStatus.TIMED_OUT, by=test, seconds=seconds)
             else:
-                is_sure = sound_s <= _limit_s(marked) * SOUND_PART
-                verdict = MutantStatus.TIMED_OUT if is_sure else MutantStatus.UNDECIDED
-                return MutantOutcome(verdict=verdict, by=test, seconds=seconds)
+                slow.append(test)
         return MutantOutcome(verdict=MutantStatus.UNDECIDED, seconds=seconds)
 
     def sound_s(self, test: str) -> float | None:
@@ -174,9 +175,10 @@ class Judge:
             self._sound[test] = run.seconds if run.code == 0 else None
         return self._sound[test]
 
-    def _left_out(self, files: Sequence[str]) -> list[str]:
+    def _left_out(self, files: Sequence[str], slow: Sequence[str]) -> list[str]:
         passes = [*self._sound.items()]
         left = [test for test, seconds in passes if seconds is None and test.partition("::")[0] in files]
+        left += slow
         return [word for test in left for word in ("--deselect", test)]
 
     def end(self) -> None:

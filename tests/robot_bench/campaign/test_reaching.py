@@ -179,6 +179,14 @@ def test_what_cannot_be_reached_is_refused(table: dict[str, object], refusal: st
         reach_of(read(ToReachTable, table, "[[reach]]"), dodge)
 
 
+def test_robots_of_several_programs_have_no_line_to_reach(dodge: Trial, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Trial, "programs", property(lambda _: {"a.elf", "b.elf"}))
+    with pytest.raises(ScenarioError, match=r"line 'a\.c:9': robots of several programs have no one line"):
+        reach_of(ToReachTable(line="a.c:9"), dodge)
+    assert reach_of(ToReachTable(text="ready"), dodge).words
+    assert source_reached(dodge, (), ()) is None
+
+
 # The corpus --------------------------------------------------------------------------
 
 COORDINATES = st.dictionaries(st.text(min_size=1), st.floats(0, 0.999), max_size=4)

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from bluepill_sim.fabric.pins import PinMode
 from bluepill_sim.fabric.subscriptions import Wave
 from p2os.errors import LocalProtocolError
-from robot_bench.wires.chip_pins import ChipPins
-from robot_bench.wires.nets import Contention, Harness, Net, Strength, WaveDrive
+from robot_bench.wires.chip_pins import OWNER, ChipPins
+from robot_bench.wires.nets import RELEASED, Contention, Harness, Net, Strength, WaveDrive
 from simbase.timing import NS_PER_S
 from tests.robot_bench.wires.fake_chip import PortsChip
 
@@ -145,6 +145,23 @@ def test_a_restored_chip_goes_on_with_its_wave_and_tells_nothing_new() -> None:
     net.edges_until(1999)
     assert net.take_waves() == []
     assert net.wave(1999) == chip.pin("PA0").wave
+
+
+@pytest.mark.parametrize(
+    ("mode", "codes"),
+    [(PinMode.ALTERNATE_PUSH_PULL, PP.codes), (PinMode.ALTERNATE_OPEN_DRAIN, (PP.codes[0], RELEASED))],
+)
+def test_a_wave_of_the_chip_drives_its_net_in_both_phases_as_the_pin_does(
+    mode: PinMode, codes: tuple[int, int]
+) -> None:
+    chip, net, _ = joined()
+    chip.pins["PA0"].configure(mode, output_bit=False)
+    chip.pin("PA0").offer_wave("TIM2_CH1", 7_000_000, 350, 100)
+    chip.run(1000)
+    chip.pins.deliver()
+    drive = net.drive_at(OWNER, 1000)
+    assert drive is not None
+    assert drive.codes == codes
 
 
 def test_levels_ahead_of_the_chip_reach_it_at_their_times() -> None:

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterable
+from itertools import chain
 
 #: First column, first row, columns, rows; rows count from the top.
 Rectangle = tuple[int, int, int, int]
@@ -19,14 +20,11 @@ def rectangles(rows: Iterable[bytes]) -> list[Rectangle]:
     """
     done: list[Rectangle] = []
     growing: dict[tuple[int, int], int] = {}
-    number = -1
-    for number, row in enumerate(rows):
+    for number, row in enumerate(chain(rows, (b"",))):  # the last one, which is empty, ends what grows
         runs = {match.span() for match in _RUN.finditer(row)}
         for span in [span for span in growing if span not in runs]:
             first = growing.pop(span)
             done.append((span[0], first, span[1] - span[0], number - first))
         for span in sorted(runs):
             growing.setdefault(span, number)
-    for span, first in growing.items():
-        done.append((span[0], first, span[1] - span[0], number + 1 - first))
     return sorted(done, key=lambda r: (r[1], r[0]))

@@ -309,6 +309,12 @@ def segments(draw: random.Random) -> Iterator[str]:  # noqa: C901 - a table of r
             flags = draw.choice((0x10, 0x10, 0x10, 2, 0x12))
             yield said((way, streams.take(101, segment(*way, begin + shift, b"abcdefgh"[:size], flags))))
             at[way] = begin + size + (flags & 2 > 0)
+    for v6, addresses in ((False, range(12, 20)), (True, range(8, 40))):
+        first, later = (segment(8101, 40000, sequence, b"abc", v6=v6) for sequence in (9, 99))
+        for place in addresses:  # another host, whose conversation begins anew
+            streams = TcpStreams()
+            other = later[:place] + bytes([later[place] ^ 1]) + later[place + 1 :]
+            yield said([place, streams.take(101, first), streams.take(101, other), streams.take(101, later)])
     with patch("p2os.capture.formats.tcp_streams.MOST_WAITING", 3):
         for count in (3, 4, 5):
             streams = TcpStreams()

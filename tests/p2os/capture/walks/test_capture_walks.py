@@ -29,8 +29,9 @@ from p2os.capture.table import table_of, tables_of, tables_of_sips, write_csv
 from p2os.protocol.command_table import BY_NUMBER
 from p2os.protocol.commands import Command
 from p2os.protocol.frames import Frame
-from p2os.protocol.packets import packet_frame
+from p2os.protocol.packets import EncoderPacket, packet_frame
 from p2os.protocol.profiles import Profile
+from p2os.protocol.sip import StandardSip
 from p2os.robots.parameters import load_parameters
 from p2os.view.capture_recording import CaptureTracks
 from p2os.view.header import PageHeader
@@ -143,6 +144,16 @@ def tables(draw: random.Random) -> Iterator[str]:
         yield said([(one.at_ns, [payload.hex() for payload in one.payloads]) for one in every])
         write_csv(tables_of_sips(every, reading, 9), text := io.StringIO())
         yield from text.getvalue().splitlines()
+    for xs in ((16383, 16384, 0), (16384, 32767, 16383), (0, 16384, 0), (5, 16389, 32768), (20000, 3000, 19000)):
+        sips = [packet_frame(StandardSip(raw_x=x, raw_y=x // 2), Profile.P2OS).to_bytes() for x in xs]
+        chunks = capture_of([(number, FROM, data) for number, data in enumerate(sips)]).chunks
+        encoder = packet_frame(EncoderPacket(left_counts=1, right_counts=2), Profile.P2OS).to_bytes()
+        mixed = capture_of([*((one.at_ns, FROM, one.data) for one in chunks), (9, FROM, encoder)])
+        for table in (
+            *tables_of_sips(sips_of(blocks_of(chunks, 2), READINGS[0]), READINGS[0], 2),
+            table_of(list(rows_of(mixed, READINGS[0])), READINGS[0]),
+        ):
+            yield said([xs, [*table.columns["x_m"]], [*table.columns["y_m"]]])
 
 
 def views(draw: random.Random) -> Iterator[str]:

@@ -15,10 +15,12 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 from unittest.mock import patch
 
 from p2os.capture import Chunk, Direction, FollowedReading
 from p2os.cli.captures import capture_files, headless
+from p2os.cli.captures import view as view_verb
 from p2os.cli.captures.capture_files import PcapFile, RecordingFile, Sinks
 from p2os.cli.captures.headless import HeadlessPage
 from p2os.cli.captures.render import _film, _size_of, _write_png, _writer_of
@@ -39,6 +41,7 @@ from p2os.protocol.packets import StandardSip, packet_frame
 from p2os.protocol.profiles import Profile
 from p2os.transport.ports import RefusedPeerError
 from p2os.view.run_control import DRIVE_HOLD_NS, RunCommand
+from p2os.view.targets import ViewTarget
 from simbase.errors import P2osError
 from simbase.timing import NS_PER_MS, NS_PER_S, Nanos
 from tests.p2os.cli.robots.test_dashboard import STATE
@@ -272,6 +275,45 @@ def pages(draw: random.Random) -> Iterator[str]:
         yield "\n".join(lines)
 
 
+VIEWS = (
+    "x", "x --no-browser", "x --drive", "x --drive --vel 150mm/s --turn-rate 20deg/s", "x --drive --vel 9m/s",
+    "x --drive --turn-rate 999deg/s", "x --vel 1m/s", "x --turn-rate 1deg/s", "x --gdb", "x --gdb 0", "x --gdb 3333",
+    "x --drive --gdb 1", "x --port 8000 --host 0.0.0.0", "x --port 65536",
+)  # fmt: skip
+
+
+def viewed(draw: random.Random) -> Iterator[str]:
+    """View what runs, can be driven or debugged, or does neither, with each option."""
+    calls: list[str] = []
+
+    def noted(name: str, answer: object = None) -> Callable[..., Any]:
+        def note(*given: object, **named: object) -> Any:
+            calls.append(f"{name} {said((given, named))}")
+            return answer
+
+        return note
+
+    @contextlib.contextmanager
+    def shown(source: object, **named: object) -> Iterator[object]:
+        calls.append(f"shown {source} {said(named)}")
+        yield SimpleNamespace(wait=noted("waits"))
+
+    ready: Any = ViewTarget(source="ready", run=noted("runs"))  # type: ignore[arg-type]  # a source
+    for found in (
+        ViewTarget(source="still"), ready, ViewTarget(source="robot", driven=noted("driven", ready)),  # type: ignore[arg-type]
+        ViewTarget(source="program", debugged=noted("debugged", ready)),  # type: ignore[arg-type]
+    ):  # fmt: skip
+        for words in VIEWS:
+            out, err = io.StringIO(), io.StringIO()
+            with (
+                patch.object(view_verb, "target_of", return_value=found), patch.object(view_verb, "shown", shown),
+                patch.dict(os.environ, COLUMNS="80"), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err),
+            ):  # fmt: skip
+                code = run(["view", *words.split()])
+            yield f"{found.source} {words}: {code} {calls} {out.getvalue()}{err.getvalue()}"
+            calls.clear()
+
+
 def keys(draw: random.Random) -> Iterator[str]:
     """Drive by keys that are held, while the program pauses, the link is lost and the page says STOP."""
     for _ in range(8):
@@ -487,7 +529,9 @@ def lists(draw: random.Random) -> Iterator[str]:
         yield said((words, code, err.getvalue(), bool(out.getvalue())))
 
 
-TRACES: dict[str, Trace] = {each.__name__: each for each in (sniffed, files, pages, keys, pads, browsers, lists)}
+TRACES: dict[str, Trace] = {
+    each.__name__: each for each in (sniffed, files, pages, viewed, keys, pads, browsers, lists)
+}
 TRACES["declared"] = declared_of(
     "p2os.cli", "p2os.cli.captures", "p2os.cli.links", "p2os.cli.robots", "p2os.cli.virtual"
 )

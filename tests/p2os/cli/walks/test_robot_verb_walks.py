@@ -4,6 +4,7 @@
 
 import contextlib
 import io
+import json
 import os
 import random
 import re
@@ -19,15 +20,18 @@ from p2os.capture.replay import Replay
 from p2os.cli.captures.record import record_session
 from p2os.cli.captures.replay import motions_of, play
 from p2os.cli.held_robot import RobotWatch, problem_of, say_what_is_beyond
+from p2os.cli.links import bench as link_bench
 from p2os.cli.links.bench import LinkBenchmark, Measured, lines_of, measure
 from p2os.cli.links.link_quality import spread_of
 from p2os.cli.links.ports import ADAPTERS, guess
 from p2os.cli.main import run
+from p2os.cli.robots import drive
 from p2os.cli.robots.command_queue import CommandQueue, is_stop
 from p2os.cli.robots.drive_deadman import DriveDeadman
 from p2os.cli.robots.page_stop import PageStop
 from p2os.cli.robots.teleop import PadDriver
 from p2os.client import DeadmanStopped, Disobeyed, GapStopped, Limits, Link, LinkLost, MotorsDisabled
+from p2os.client.goals import MotionResult
 from p2os.client.notices import LinkLostError
 from p2os.errors import TransportError
 from p2os.gamepad import PadReport
@@ -49,6 +53,8 @@ drive URL --forward -10cm --turn 30deg --vel 100mm/s --turn-rate 20deg/s
 drive URL --vel 0.2m/s --turn-rate 10deg/s --for 500ms --json
 drive URL --vel 3m/s --turn-rate 400deg/s --for 300ms
 drive URL --forward 9m
+drive URL --forward 12cm --turn 20deg --json
+drive URL --turn -25deg
 send URL SONAR 0
 send URL ENCODER 1 --json
 send URL 250 126
@@ -216,6 +222,14 @@ def measured(draw: random.Random) -> Iterator[str]:
         found = Measured(connect_ms=12.6, period=spread_of([100 * NS_PER_MS] * count), round_trip=spread_of([NS_PER_MS * n for n in range(count)]),
                          unanswered=lost, packets=count, missed=lost, bad_checksums=lost + 1, noise_bytes=7, given_up=lost, seconds=1.5)  # fmt: skip
         yield said((lines_of(found), asdict(found)))
+        with (
+            patch.object(link_bench, "measure", return_value=found), patch.object(link_bench, "open_url"),
+            patch.object(link_bench, "hold_robot"),
+        ):  # fmt: skip
+            yield ran("bench URL --for 2s")
+            yield ran("bench URL --json")
+    results = [MotionResult(asked=0.123456789, reached=-1.23456789, took_ns=took) for took in (0, 1_234_567_890)]
+    yield "\n".join(json.dumps(drive._step("forward", "m", one)) for one in results)
     line = Bench(profile=Profile.P2OS)
     bench = LinkBenchmark(line.now)
     data = b""

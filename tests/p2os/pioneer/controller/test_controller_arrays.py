@@ -168,10 +168,11 @@ def test_an_eye_sees_what_is_as_near_as_it_looks(body: str) -> None:
     driver.say(C.IOREQUEST, 1)
     (packet,) = [IoPacket.from_frame(frame) for frame in driver.packets(500) if frame.kind == IoPacket.KIND]
     assert packet.digital_in[3] == 0xFF
-    driver.robot.body.stand_at(1.0, 0.0, math.radians(35.0))
-    driver.say(C.IOREQUEST, 1)
-    (packet,) = [IoPacket.from_frame(frame) for frame in driver.packets(500) if frame.kind == IoPacket.KIND]
-    assert packet.digital_in[3] == 0xFE
+    for number, (x_mm, y_mm) in enumerate(driver.parameters.infrared[:2]):  # each in turn looks at the wall
+        driver.robot.body.stand_at(1.0, 0.0, -math.atan2(y_mm, x_mm))
+        driver.say(C.IOREQUEST, 1)
+        (packet,) = [IoPacket.from_frame(frame) for frame in driver.packets(500) if frame.kind == IoPacket.KIND]
+        assert packet.digital_in[3] == 0xFF ^ 1 << number
 
 
 def test_a_kick_holds_the_first_output_for_its_time(make_robot: Any) -> None:

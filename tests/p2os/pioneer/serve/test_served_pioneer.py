@@ -1,6 +1,7 @@
 """A robot that a program serves to itself: its options are those of `p2os serve`."""
 
 import inspect
+import threading
 from pathlib import Path
 
 import pytest
@@ -41,6 +42,14 @@ def test_it_speaks_what_its_model_speaks_or_what_it_is_told_to(words: dict[str, 
     clock = VirtualClock()
     with served_pioneer(body="kinematic", clock=clock, **words) as url, Robot(url, clock=clock) as robot:  # type: ignore[arg-type]
         assert robot.profile is family
+
+
+def test_its_thread_ends_with_it_and_keeps_no_program_from_ending() -> None:
+    with served_pioneer(body="kinematic", clock=VirtualClock()):
+        (thread,) = [one for one in threading.enumerate() if one.name == "p2os-pioneer"]
+        assert thread.daemon
+    thread.join(60)
+    assert not thread.is_alive()
 
 
 def test_what_describes_the_robot_reaches_it(tmp_path: Path) -> None:

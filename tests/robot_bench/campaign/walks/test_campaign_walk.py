@@ -20,7 +20,7 @@ from pyarrow import parquet
 from p2os.pioneer.world import load_world
 from robot_bench.campaign import things
 from robot_bench.campaign import whole as whole_module
-from robot_bench.campaign.campaign_file import CampaignTable, campaign_schema, parse_campaign
+from robot_bench.campaign.campaign_file import CampaignTable, RunLimits, campaign_schema, parse_campaign
 from robot_bench.campaign.conduct import CampaignProgress
 from robot_bench.campaign.last_moment import LastMoment
 from robot_bench.campaign.margin import goal_margin, margin
@@ -30,14 +30,16 @@ from robot_bench.campaign.results import PointRate, Whole
 from robot_bench.campaign.search import Listed
 from robot_bench.campaign.space import Space
 from robot_bench.campaign.suggestion import suggested
-from robot_bench.campaign.trial import GoalResult, HullContact, Outcome, SeenSoFar, Trial, TrialVerdict
+from robot_bench.campaign.trial import GoalResult, HullContact, Outcome, SeenSoFar, Trial, TrialVerdict, trial_of
 from robot_bench.campaign.variants import diversity
 from robot_bench.campaign.whole import begin, carry_out, points_of, resume
+from robot_bench.campaign.workers import processes
 from robot_bench.cli.campaigns import campaign as verb
 from robot_bench.events.kinds import Contact, Note, Pose, Text
 from robot_bench.scenario.loading import load_scenario
 from simbase.errors import P2osError
 from tests.robot_bench.campaign.test_campaign import Shuffled
+from tests.robot_bench.firmware import thumb
 from tests.tools.suite.approved import Trace, judge_of, rounded, said, tried
 from tests.tools.suite.declared import declared_of
 
@@ -316,6 +318,64 @@ def files(_draw: Random) -> Iterator[str]:
     yield said(CampaignTable)
 
 
+def packed(_draw: Random) -> Iterator[str]:
+    """Pack scenarios with the files that they name: worlds that stand alone and that import, programs, own robots."""
+    with TemporaryDirectory(prefix="p2os-test-") as name:
+        folder = Path(name)
+        head = 'name = "hall"\nextent_m = [-2, -2, 2, 2]\n'
+        hall = f'{head}[[box]]\nname = "a"\nx_m = 1\ny_m = 1\nlength_m = 1\nwidth_m = 1\n'
+        wedge = "v -2 -2 0\nv -1 -2 0\nv -2 -1 0\nv -2 -2 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+        for file, text in (
+            ("hall.toml", hall), ("more.toml", f'{hall}[[import]]\nfile = "wedge.obj"\n'), ("wedge.obj", wedge),
+            ("own.toml", 'model = "p3dx"\n'),
+        ):  # fmt: skip
+            (folder / file).write_text(text, encoding="utf-8")
+        (folder / "mine.bin").write_bytes(thumb.SLEEP)
+        for number, (old, new) in enumerate((
+            ("", ""), ('"room"', '"hall.toml"'), ('"room"', '"more.toml"'), ('"room"', '"wedge.obj"'),
+            ('"room"', '"gone.toml"'), ('"dodge.elf"', '"mine.bin"'),
+            ("duration_s", 'seeds = "1-3"\nseed = 2\nduration_s'),
+        )):  # fmt: skip
+            file = folder / f"s{number}.toml"
+            file.write_text(SCENARIO.replace(old, new), encoding="utf-8")
+            yield new
+            yield tried(_packed, file, None).replace(name, "HERE")
+            yield tried(_packed, file, folder / "mine.bin").replace(name, "HERE")
+        yield tried(trial_of, "none")
+
+
+def _packed(file: Path, firmware: Path | None) -> object:
+    found = trial_of(str(file), firmware=firmware, settings=[("threshold_m", 0.45)])
+    files = {key: rounded(data.decode()) if key.endswith(".toml") else "" for key, data in found.files.items()}
+    return [found.name, found.seed, found.trusted, [(key, found.table[key]) for key in sorted(found.table)], files]
+
+
+def limited(_draw: Random) -> Iterator[str]:
+    """Do pieces of work within limits that are only noted: some need too much, some have a bug."""
+    calls: list[str] = []
+
+    def work(look: Any) -> Any:
+        look()
+        return Outcome(verdict=TrialVerdict.PASSED)
+
+    def greedy(_look: Any) -> Any:
+        raise MemoryError
+
+    def wrong(_look: Any) -> Any:
+        raise KeyError("no such thing")
+
+    with (
+        mock.patch.object(processes, "_limit", lambda *given: calls.append(said(given[1]))),
+        mock.patch.object(processes, "_cpu_s", return_value=7.2),
+        mock.patch.object(processes, "_mapped_bytes", return_value=1000),
+    ):
+        for limits in (RunLimits(), RunLimits(cpu_s=1.0, memory_mb=64), RunLimits(cpu_s=1.6), RunLimits(cpu_s=2.4)):
+            for one in (work, greedy, wrong):
+                found, is_sound = processes._limited(one, limits, lambda: calls.append("look"))
+                yield said([limits, is_sound, getattr(found, "failures", ()), calls])
+                calls.clear()
+
+
 def figures(draw: Random) -> Iterator[str]:
     """Work out margins, rates, and words of the journal and of Markdown."""
     for unit in ("m", "s", "deg", "°", "m/s", "m/s²", "J", "", "x"):
@@ -385,7 +445,8 @@ def drawn_things(draw: Random) -> Iterator[str]:
 
 
 TRACES: dict[str, Trace] = {
-    "files": files, "figures": figures, "things": drawn_things, "seen": seen_so_far,
+    "files": files, "packed": packed, "limited": limited, "figures": figures, "things": drawn_things,
+    "seen": seen_so_far,
 }  # fmt: skip
 for _package in ("campaign", "campaign.reaching", "campaign.workers", "campaign.pages"):
     TRACES[f"declared in {_package}"] = declared_of(f"robot_bench.{_package}")

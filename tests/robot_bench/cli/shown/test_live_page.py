@@ -31,7 +31,7 @@ from robot_bench.scenario.loading import load_scenario  # noqa: E402
 from robot_bench.view.run_recording import recording_of  # noqa: E402
 from simbase.errors import MissingDependencyError  # noqa: E402
 
-SCENARIO = load_scenario("motors").with_options(body="kinematic", duration_s=6.5)
+SCENARIO = load_scenario("motors").with_options(body="kinematic", duration_s=2.5)
 
 
 @pytest.fixture(scope="module")

@@ -9,6 +9,10 @@ from types import SimpleNamespace
 from typing import Any
 from unittest import mock
 
+from bluepill_sim.board import BluePill
+from p2os.cli.main import run as p2os
+from robot_bench.campaign.variants.mutation.suite import Suite, SuiteRun
+from robot_bench.campaign.variants.mutation.trial import Fate, MutantResult
 from robot_bench.cli import board, sweep, table
 from robot_bench.cli import run as run_verb
 from robot_bench.cli.campaigns import mutate, shrink
@@ -193,6 +197,134 @@ def studies(draw: Random) -> Iterator[str]:
     yield said(draw.random())
 
 
+def shrunk(_draw: Random) -> Iterator[str]:
+    """Carry out the verb that shrinks, whose work is only noted: what it asks for, prints and ends with."""
+    calls: list[str] = []
+    failure = SimpleNamespace(way="no_collision: front", says="it hit", at_ns=1_500_000_000)
+    small: Any = SimpleNamespace(
+        failure=failure, things_before=9, things_after=2, trials=33, is_complete=True,
+        trial=SimpleNamespace(trusted=()),
+    )  # fmt: skip
+
+    def shrink_it(trial: Any, *, quick: object, budget: int, judge: Any) -> object:
+        calls.append(said([trial.name, trial.seed, quick, budget, judge(trial, "way", 5)]))
+        return small
+
+    def failure_of(trial: Any, way: object, until_ns: object, look: Any) -> str:
+        calls.append(said([trial.name, way, until_ns, look() is None]))
+        return "failed"
+
+    with (
+        in_folder() as folder, mock.patch.object(shrink, "shrink", shrink_it),
+        mock.patch.object(shrink, "failure_of", failure_of), mock.patch.object(shrink, "keep") as keep,
+    ):  # fmt: skip
+        for confirmed in (True, False):
+            keep.return_value = SimpleNamespace(
+                scenario=Path("/k/s.toml"), test=Path("/k/t.py"), is_confirmed=confirmed, explained="why so",
+                outcome=SimpleNamespace(sha256="0123456789abcdefgh"),
+            )  # fmt: skip
+            for words in ("dodge", "dodge --json --out there --quick", "dodge --budget 7 --seed 4 --goal no_collision"):
+                yield f"$ shrink {words}"
+                yield from (line.replace(str(folder), "HERE") for line in printed(p2os, ["shrink", *words.split()]))
+                yield said([calls, keep.call_args.args[1:]])
+                calls.clear()
+
+
+MUTATED = (
+    "dodge", "dodge --json --junit r.xml", "dodge --sample 5 --seed 3 --write out -j 2", "dodge --only dodge_fsm.c",
+    "dodge --only nothing", "dodge --fail-under 99%", "dodge --sample 5 --fail-under 10%", "dodge motors --only main",
+    "dodge tests.py", "tests.py --sample 4", "dodge tests.py --json --sample 3 --seed 1", "dodge --write taken/x",
+    "dodge --junit none/r.xml",
+)  # fmt: skip
+
+
+def mutated(draw: Random) -> Iterator[str]:
+    """Carry out the verb that changes programs, whose runs are made up: what is tried, told, written and ended with."""
+    calls: list[str] = []
+    firmware = load_scenario("dodge").firmware
+    first = BluePill(firmware).pc
+    ran = dict.fromkeys(range(first, first + 40, 2), 0)
+
+    def in_processes(job: Any, count: int, *, at_once: int, on_done: Any, raise_if_interrupted: Any) -> bool:
+        calls.append(said([count, at_once]))
+        for number in range(count):
+            on_done(number, job(number, raise_if_interrupted) if draw.random() < 0.9 else {
+                "failures": draw.choice((["killed", "x"], [INTERRUPTED], ["ended by SIGXCPU"]))})  # fmt: skip
+        return draw.random() < 0.8
+
+    def come_to(mutant: Any, bases: Any, _clock: object, look: Any) -> MutantResult:
+        calls.append(said([f"{mutant.address:x}", len(bases), look() is None]))
+        return MutantResult(draw.choice([*Fate]), "dodge", "it did", draw.choice((0, 1_500_000_000)))
+
+    def by_tests(suite: Suite, mutant: Any, limit_s: int) -> MutantResult:
+        calls.append(said([len(suite.base.addresses), f"{mutant.address:x}", limit_s]))
+        return MutantResult(draw.choice([*Fate]), "tests.py", "test_b")
+
+    suites = iter(SuiteRun(**one) for one in (
+        {"addresses": {*ran}, "sha256": "ab", "cpu_s": 0.5}, {"failed": "test_a", "sha256": "ab"}, {"sha256": "ab"},
+    ) * 9)  # fmt: skip
+    with (
+        in_folder() as folder, mock.patch.object(mutate, "run_in_processes", in_processes),
+        mock.patch.object(mutate, "base_run", return_value=SimpleNamespace(first_ns=ran)),
+        mock.patch.object(mutate, "try_mutant", come_to), mock.patch.object(mutate, "load_pytest"),
+        mock.patch.object(mutate, "run_suite", side_effect=suites), mock.patch.object(mutate, "core_count", int),
+        mock.patch.object(Suite, "try_mutant", by_tests),
+    ):  # fmt: skip
+        Path("tests.py").write_text("", encoding="utf-8")
+        Path("taken").write_text("", encoding="utf-8")
+        for words in MUTATED:
+            yield f"$ mutate {words}"
+            for line in printed(p2os, ["mutate", str(firmware), *words.split()]):
+                yield line.replace(str(folder), "HERE").replace(str(firmware.parent), "FIRMWARE")
+            yield said(calls)
+            calls.clear()
+            for made in sorted(path for path in folder.rglob("*") if path.suffix in {".xml", ".elf", ".bin"}):
+                yield made.name if made.suffix != ".xml" else made.read_text(encoding="utf-8")
+                made.unlink()
+
+
+ALONE = "dodge --trajectories 0 --vary threshold_m=0.4..0.8"
+VARIED = (
+    ALONE, f"{ALONE} --steps 3 --json", f"{ALONE} --vary start.x_m=-0.5..0.5 --steps 3 --outcome path_m",
+    f"{ALONE} --seeds 0-2 --steps 2 --set start.y_m=0.1", f"{ALONE} --body kinematic --duration 2s --steps 2 -j 3",
+    f"{ALONE} --outcome none", f"{ALONE} --steps 2 --picture a.png", "dodge", "dodge --trajectories 0 --steps 1",
+)  # fmt: skip
+
+
+def varied(draw: Random) -> Iterator[str]:
+    """Carry out the verb that varies scenarios, whose runs are made up: which are asked for, and what they come to."""
+    calls: list[str] = []
+    dodge = load_scenario("dodge")
+
+    def load(name: str, *, settings: Any, **named: Any) -> Scenario:
+        calls.append(said([name, settings, named["set_by"]]))
+        return replace(dodge, name=str(dict(settings).get("threshold_m", 0.6)))  # by which a run is known
+
+    def outcomes(scenario: Scenario, look: Any) -> dict[str, float]:
+        look(5)
+        calls.append(said([scenario.name, scenario.seed, scenario.body == "kinematic", scenario.duration_ns]))
+        return {"path_m": 2 * float(scenario.name) + 0.01 * scenario.seed, "goal 1: 1 m": 1 - float(scenario.name) ** 2}
+
+    def in_processes(job: Any, count: int, *, at_once: int, on_done: Any, raise_if_interrupted: Any) -> bool:
+        calls.append(said([count, at_once]))
+        for number in reversed(range(count)):
+            on_done(number, job(number, raise_if_interrupted))
+        return draw.random() < 0.9
+
+    with (
+        in_folder(), mock.patch.object(sensitivity, "load_scenario", load),
+        mock.patch("robot_bench.experiments.sensitivity.outcomes_of", outcomes),
+        mock.patch.object(sensitivity, "run_in_processes", in_processes), mock.patch.object(sensitivity, "require"),
+        mock.patch.object(sensitivity, "core_count", int), mock.patch.object(sensitivity, "load_once"),
+        mock.patch.object(sensitivity, "_draw", lambda *given: calls.append(said(given))),
+    ):  # fmt: skip
+        for words in VARIED:
+            yield f"$ sensitivity {words}"
+            yield from printed(p2os, ["sensitivity", *words.split()])
+            yield said(calls)
+            calls.clear()
+
+
 SETTINGS: tuple[tuple[tuple[str, object], ...], ...] = (
     (),
     (("threshold_m", 0.4), ("start.x_m", 1)),
@@ -317,5 +449,13 @@ def validations(_draw: Random) -> Iterator[str]:
         yield said(reported)
 
 
-TRACES = {"tables": tables, "studies": studies, "sweeps": sweeps, "validations": validations}
+TRACES = {
+    "tables": tables,
+    "studies": studies,
+    "shrunk": shrunk,
+    "mutated": mutated,
+    "varied": varied,
+    "sweeps": sweeps,
+    "validations": validations,
+}
 test_what_verbs_make_of_results_is_what_was_approved = judge_of(__file__, TRACES)

@@ -156,6 +156,8 @@ validate motors --mode both
 validate --port x --mode direct
 validate --port x --body kinematic
 validate --port x --seeds 0-1
+validate slip --port x
+validate slip long --port x
 validate --port x --world room
 validate --port x -j 2
 validate --yes

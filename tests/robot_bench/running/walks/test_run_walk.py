@@ -14,6 +14,10 @@ from unittest import mock
 
 from adapter_sim.masters import Master
 from adapter_sim.pinout import load_pinout
+from p2os.errors import TransportError
+from p2os.pioneer.body.factory import make_body
+from p2os.pioneer.controller import ControllerSettings, Pioneer
+from p2os.pioneer.world.loader import load_world
 from p2os.robots.parameters import load_parameters
 from robot_bench import adapter, run
 from robot_bench.bench import board as board_module
@@ -28,13 +32,17 @@ from robot_bench.bench.waiting import EventWait, mark_of
 from robot_bench.cli.shown.fleet_hands import FleetHands
 from robot_bench.recording.recorder import Recorder
 from robot_bench.recording.summary import outcome_of
+from robot_bench.remote import RemoteBench
 from robot_bench.report.make import Files
 from robot_bench.running.loop import RunLoop
+from robot_bench.running.pacer import RealTimePacer
 from robot_bench.scenario.loading import load_scenario
 from robot_bench.scenario.scenario import Scenario
 from simbase.errors import P2osError
 from simbase.timing import NS_PER_MS
+from tests.robot_bench.firmware import thumb
 from tests.robot_bench.firmware.hurried import hurried
+from tests.robot_bench.run.test_port import Clock
 from tests.tools.suite.acted import Acted, taken
 from tests.tools.suite.approved import Trace, judge_of, said, tried
 from tests.tools.suite.declared import declared_of
@@ -196,6 +204,14 @@ def runs(_draw: Random) -> Iterator[str]:
             )
             yield said(outcome_of(record)).replace(name, "HERE")[:2000]
             yield said([pins_of(scenario), sorted(cut_wires(scenario, load_pinout()))])
+        for program in ("SPIN", "NOWHERE", "DIVIDE", "OVERFLOW", "SLEEP"):
+            file = Path(name, f"{program}.bin")
+            file.write_bytes(getattr(thumb, program))
+            short = load_scenario("dodge", firmware=file).with_options(body="kinematic", duration_s=0.02)
+            bench = Bench(replace(short, goals=()))
+            bench.run_until(bench.end)
+            yield said([program, bench.now, bench.chip.verdict, bench.chip.has_died, run.notes(bench, bench.end, None)])
+            yield said([bench.judge(), *bench.last_events(3)]).replace(name, "HERE")
 
 
 def together(_draw: Random) -> Iterator[str]:
@@ -225,6 +241,11 @@ def together(_draw: Random) -> Iterator[str]:
     yield said(first.judge())
     for bench in benches.values():
         yield from shown_lines(bench)
+    for bench in (first, second):
+        run_of(bench).ends_at = ends = first.end - SLICE_NS  # its scenario ends it, and the other one's does not
+        for at in (ends - 1, ends, ends + 1):
+            yield said([[run_of(one).ended(at), run_of(one).end, run_of(one).whole_end] for one in (first, second)])
+        run_of(bench).ends_at = None
 
 
 #: What is asked of a bench, one after the other: the method, its arguments.
@@ -367,6 +388,85 @@ def refusals(_draw: Random) -> Iterator[str]:
     yield tried(board_module.plug_in, dodge, chip, board)
 
 
+class RobotLine:
+    """A line to a virtual robot that follows a clock; it may break, and the robot may fall silent."""
+
+    description = "a robot"
+
+    def __init__(self, clock: Clock, *, breaks_ns: int = 1 << 60, silent_ns: int = 1 << 60) -> None:
+        robot = load_parameters("p2dx")
+        self._clock, self._breaks_ns, self._silent_ns = clock, breaks_ns, silent_ns
+        self._robot = Pioneer(
+            parameters=robot, body=make_body("kinematic", load_world("room"), robot), settings=ControllerSettings(),
+            on_event=lambda *_: None,
+        )  # fmt: skip
+        self.sent, self.is_closed = b"", False
+
+    def read(self) -> bytes:
+        if self._clock.now >= self._breaks_ns:
+            raise TransportError("the line is gone")
+        self._robot.advance_to(self._clock.now)
+        data = b"".join(self._robot.take_output())
+        return data if self._clock.now < self._silent_ns else b""
+
+    def write(self, data: bytes) -> None:
+        if self._clock.now >= self._breaks_ns:
+            raise TransportError("the line is gone")
+        self.sent += data
+        self._robot.receive(data, self._clock.now)
+
+    def fileno(self) -> int:
+        return -1
+
+    def set_baud(self, baud: int) -> None: ...
+
+    def close(self) -> None:
+        self.is_closed = True
+
+
+AT_PORT = """
+[[goal]]
+kind = "happens"
+event = "usart1 sends CRUISE"
+{ends}
+[[goal]]
+kind = "no_collision"
+"""
+
+
+def at_ports(_draw: Random) -> Iterator[str]:
+    """Drive a robot at a port by a clock: to the end, ended by a goal, lagging, cut off, left without an answer."""
+    with TemporaryDirectory(prefix="p2os-test-") as name:
+        text = HEAD.format(firmware=hurried("dodge", 5), mode="adapter", duration=1.4) + THINGS
+        for what, ends, named in (
+            ("whole", "", {}), ("met", 'ends_run = "met"', {}),
+            ("lags", "", {}), ("breaks", "", {"breaks_ns": 1_100_000_000}), ("silent", "", {"silent_ns": 900_000_000}),
+        ):  # fmt: skip
+            file = Path(name, f"{what}.toml")
+            file.write_text(text + AT_PORT.format(ends=ends), encoding="utf-8")
+            scenario, clock = load_scenario(str(file)), Clock()
+            line = RobotLine(clock, **named)
+            bench = RemoteBench(scenario, line, RealTimePacer(clock=clock, sleep=clock.sleep))
+            bench.start_clock()
+
+            def late(now: int, what: str = what, clock: Clock = clock) -> None:
+                clock.now += (101 * NS_PER_MS) * (what == "lags" and now >= 1_000_000_000)
+
+            bench.on_slice = late
+            yield f"{what} {tried(bench.run_until, scenario.duration_ns)}"
+            yield said([bench.note, bench.is_closed, bench.chip.now_ns, bench.adapter.state, clock.now, line.is_closed])
+            yield said([len(line.sent), line.sent[-60:].hex(), bench.goals.has_ended_run])
+            yield said([bench.judge(bench.chip.now_ns), bench.finish(), bench.recorder.distance_m])
+            yield from (row.rstrip() for row in bench.trace.lines() if '"k":"wire"' not in row)
+        clock = Clock()
+        done = run.run_at_port(
+            scenario, Path(name, "run"), RobotLine(clock), clock=clock, files=Files.SUMMARY,
+            pacer=RealTimePacer(clock=clock, sleep=clock.sleep),
+        )  # fmt: skip
+        kept = {key: value for key, value in done.outcome.items() if key not in {"trace_sha256", "firmware_sha256"}}
+        yield said([done.passed, done.was_interrupted, kept]).replace(name, "HERE")
+
+
 def numbers(_draw: Random) -> Iterator[str]:
     """Give the adapter's firmware its numbers, for each robot; and round what is reported of things."""
     with TemporaryDirectory(prefix="p2os-test-") as name:
@@ -392,7 +492,7 @@ def numbers(_draw: Random) -> Iterator[str]:
 
 TRACES: dict[str, Trace] = {
     "declared": declared_of("robot_bench", "robot_bench.bench", "robot_bench.running"),
-    "refusals": refusals, "numbers": numbers, "together": together, "expectations": expectations, "runs": runs,
-    "folders": folders,
+    "refusals": refusals, "numbers": numbers, "ports": at_ports, "together": together,
+    "expectations": expectations, "runs": runs, "folders": folders,
 }  # fmt: skip
 test_what_short_runs_are_is_what_was_approved = judge_of(__file__, TRACES)

@@ -3,11 +3,12 @@
 import math
 import random
 from collections.abc import Iterator
+from unittest.mock import patch
 
 from p2os.pioneer.body.contacts import APART_STEPS
 from p2os.pioneer.body.contract import BodyState
 from p2os.pioneer.body.factory import make_body, make_scene
-from p2os.pioneer.body.in_world import free_name
+from p2os.pioneer.body.in_world import StandingPose, free_name
 from p2os.pioneer.body.kinematic import KinematicBody
 from p2os.pioneer.world.model import Obstacle, ObstacleKind, Pose, Walk, World
 from p2os.robots.parameters import load_parameters
@@ -40,6 +41,24 @@ def faced(draw: random.Random) -> Iterator[str]:
                     ]
                     yield said(
                         (far_m, aside, turn, seen, one.clearance(), one.who_stands_at_start(), one.ranges(range(8)))
+                    )
+
+
+def levels(draw: random.Random) -> Iterator[str]:
+    """Ask of robots whose floors lie at several heights which of them is near, and which echoes."""
+    plain = KinematicBody.standing_pose
+    for model in (P2DX, PATROL):
+        for there in (Pose(1.2, 0.0, math.pi), Pose(1.2, 0.6, 0.0)):
+            one, other = make_scene("kinematic", world(), [P2DX, model], [Pose(0, 0, 0), there]).bodies
+            for above_m in (0.0, 0.1, 0.15, 0.19, 0.2, 0.22, 0.24, 0.3, 0.5, 1.0):
+
+                def raised(body: object, which: object = other, above_m: float = above_m) -> StandingPose:
+                    x, y, turn, z = plain.fget(body)  # type: ignore[attr-defined]  # a property
+                    return StandingPose(x, y, turn, z + above_m * (body is which))
+
+                with patch.object(KinematicBody, "standing_pose", property(raised)):
+                    yield said(
+                        (above_m, one.clearance(), other.clearance(), one.ranges(range(8)), other.ranges((3, 4)))
                     )
 
 
@@ -144,5 +163,5 @@ def blocked(draw: random.Random) -> Iterator[str]:
     )
 
 
-TRACES: dict[str, Trace] = {each.__name__: each for each in (faced, placed, pushed, blocked)}
+TRACES: dict[str, Trace] = {each.__name__: each for each in (faced, levels, placed, pushed, blocked)}
 test_what_was_approved_is_shown = judge_of(__file__, TRACES)

@@ -11,6 +11,7 @@ from pathlib import PurePath
 from p2os.pioneer.export import FORMATS, export, scene_of
 from p2os.pioneer.export.scene import Property
 from p2os.pioneer.world.loader import load_world
+from p2os.pioneer.world.model import Mesh
 from p2os.robots.parameters import load_parameters
 from tests.p2os.pioneer.world.walks.things import drawn_world
 from tests.tools.suite.approved import Trace, judge_of, rounded, said, tried
@@ -19,6 +20,8 @@ from tests.tools.suite.declared import declared_of
 ROBOTS = ("p2dx", "p3at-sh", "amigo", "patrolbot-sh", "powerbot", "seekur")
 #: What a format, the robot or the ground has taken, and what no format takes.
 NAMES = ("world", "ground", "a::b", "c__d", " e ", "", "hull", "world 2", "x" * 80, "x" * 80)
+#: Corners of meshes that have fewer than a solid, and as many.
+LEAF = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.1), (0.5, 1.0, 0.2), (0.0, 1.5, 0.6), (-0.5, 0.5, 0.3))
 #: Of a binary glTF: its magic, version and length, and the length and kind of its first chunk.
 GLB_HEADER = struct.Struct("<4s3I4s")
 
@@ -67,6 +70,11 @@ def scenes(draw: random.Random) -> Iterator[str]:
 def files(draw: random.Random) -> Iterator[str]:
     """Write them in each format, and say what that does not hold."""
     worlds = [load_world("room"), load_world("ramp"), drawn_world(draw), drawn_world(draw)]
+    leaves = [
+        Mesh(name=f"leaf {count}", vertices=LEAF[:count], triangles=tuple((0, n, n + 1) for n in range(1, count - 1)))
+        for count in range(3, len(LEAF) + 1)
+    ]
+    worlds.append(replace(worlds[0], obstacles=(), meshes=tuple(leaves)))
     for ending in FORMATS:
         for number, world in enumerate([None, *worlds]):
             robot = load_parameters(ROBOTS[number]) if number % 2 == 0 else None

@@ -284,6 +284,9 @@ def turns(draw: random.Random) -> Iterator[str]:
             return left[0] == 0
 
         served.run(until=is_over)
+        seen: Any = Polled(Terminal(lambda _: None))
+        seen.poll_s = 0.002
+        Fleet(place.hosts, control=ControlLine(seen)).turn(0.5)  # somebody may come where no descriptor shows it
         yield said((waited, len(lines), [host.listener.fileno() for host in place.hosts], operator.fileno()))
     busy = FleetOrder(robots=robots(3), body="kinematic")
     taken = Loops()
@@ -544,6 +547,37 @@ def afterwards(draw: random.Random) -> Iterator[str]:
         yield did(place.loops.connect, "y")
 
 
+def handed_over(draw: random.Random) -> Iterator[str]:
+    """Yield what the next client reads, on a line that takes its time or none, soon behind one that asked for much."""
+    much = [*SYNCS[:4], Command(C.CONFIG), Command(C.HOSTBAUD, 4), Command(C.CONFIG), Command(C.ENCODER, 2)]
+    for baud in (None, 9600):
+        for later_ms in (0, 1, 30):
+            order = FleetOrder(robots=robots(1, model="p3dx", settings={"baud": baud}), body="kinematic")
+            place = Place(order)
+            (host,) = place.hosts
+            first = place.loops.connect("r1")
+            first.write(raw(much))
+            for _ in range(9):
+                place.turn()
+                place.clock.now += 55 * NS_PER_MS
+            first.write(raw(much[4:]))
+            place.turn()
+            place.clock.now += later_ms * NS_PER_MS
+            first.close()
+            place.clients[0].append(place.loops.connect("r1"))
+            for _ in range(8):
+                waits = [] if host._lines is None else [(line.waiting, line.next_deadline()) for line in host._lines]
+                yield place.turn() + said((host.client, host.pioneer.baud, host._baud, waits)) + place.happened()
+                place.clock.now += draw.choice((1, 5, 40)) * NS_PER_MS
+            place.clients[0][0].write(raw(SYNCS))
+            place.clock.now += 300 * NS_PER_MS
+            yield place.turn() + place.happened()
+            refused = place.loops.connect("r1")
+            yield place.turn() + place.happened()
+            host.close()
+            yield did(refused.write, b"x") + place._read(refused) + place.happened()
+
+
 def world_words(draw: random.Random) -> Iterator[str]:
     found = make_fleet(FleetOrder(robots=robots(2), body="kinematic"))
     assert found.multi_robot_world is not None
@@ -636,7 +670,7 @@ TRACES: dict[str, Trace] = {
     each.__name__: each
     for each in (
         alone, paced, fast, together, apart, shouting, turns, operators, fleets, made, world_words, pacing, robot_time,
-        background, afterwards,
+        background, afterwards, handed_over,
     )
 }  # fmt: skip
 TRACES["declared"] = declared_of("p2os.pioneer.serve")

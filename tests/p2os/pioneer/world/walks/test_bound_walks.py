@@ -177,12 +177,19 @@ def models(draw: random.Random) -> Iterator[str]:
                            mu=f"<surface><friction><ode><mu>{mu}</mu></ode></friction></surface>")  # fmt: skip
         yield from _things_of(f"<sdf><model name='m'>{body}</model></sdf>", "a.sdf")
         for joint in ("floating", "fixed", "continuous"):
-            yield from _things_of(
-                f"<robot><link name='a'/><link name='b'><inertial><mass value='2'/></inertial><contact><lateral_friction "
-                f"value='{mu}'/></contact><collision><geometry><cylinder radius='0.2' length='1'/></geometry></collision>"
-                f"</link><joint name='j' type='{joint}'><parent link='a'/><child link='b'/></joint></robot>", "a.urdf"
-            )  # fmt: skip
+            yield from _things_of(urdf_of(joint, f"<contact><lateral_friction value='{mu}'/></contact>"), "a.urdf")
+    for joint, mass, count in (("floating", "", 1), ("floating", "<mass/>", 1), ("floating", "<mass value='2'/>", 2),
+                               ("floating", "<mass value='2'/>", 0), ("floating", "<mass value='2'/>", 1)):  # fmt: skip
+        yield from _things_of(urdf_of(joint, "", mass, count), "a.urdf")
     yield said([annotation.pushed(annotation.Traits(kind=kind), 1.0, 0.1) for kind in ObstacleKind])
+
+
+def urdf_of(joint: str, contact: str, mass: str = "<mass value='2'/>", count: int = 1) -> str:
+    shape = "<collision><geometry><cylinder radius='0.2' length='1'/></geometry></collision>"
+    return (
+        f"<robot><link name='a'/><link name='b'><inertial>{mass}</inertial>{contact}{shape * count}</link>"
+        f"<joint name='j' type='{joint}'><parent link='a'/><child link='b'/></joint></robot>"
+    )
 
 
 def nested(draw: random.Random) -> Iterator[str]:
@@ -367,6 +374,8 @@ def grids(draw: random.Random) -> Iterator[str]:
         lines = f"NumLines: 1\nLINES\n{x0} {y0} {x1} {y1}\n" if number % 2 else ""
         text = f"2D-Map\nResolution: {draw.choice((0, 20, 50, 100))}\n{lines}DATA\n"
         yield from _things_of(text + "\n".join(f"{x} {y}" for x, y in points) + "\n", "a.map")
+    for note in ("# x", "; x", "", "  # x"):
+        yield from _things_of(f"2D-Map\n{note}\nLINES\n{note}\n0 -900 900 -900\n{note}\nDATA\n{note}\n0 0\n", "a.map")
     for most in (20, 21, 400, 441):
         with patch.object(aria_map, "MOST_CELLS", most), patch.object(aria_map, "MOST_LINE_CELLS", most):
             yield from _things_of("2D-Map\nDATA\n0 0\n400 400\n", "a.map")

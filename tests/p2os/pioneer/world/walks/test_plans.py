@@ -40,6 +40,12 @@ def meshes(draw: random.Random) -> Iterator[str]:
         yield said([model.has_area(*(mesh.vertices[i] for i in one)) for one in mesh.triangles])
         for low, high in ((0.05, 0.22), (0.0, 0.4), (-0.3, 0.1)):
             yield said((model.cut(mesh, low), model.shadow(mesh, low, high)))
+    for grains in (0.05, 0.09, 0.11, 0.5, 0.99, 1.01, 2.0, 9.0, 11.0):  # two corners nearly at one place
+        near = grains * model.GRAIN_M
+        corners = ((0.0, 0.0, 0.1), (1.0, 0.0, 0.1), (1.0, near, 0.1), (0.0, 1.0, 0.15))
+        mesh = model.Mesh(name="twins", vertices=corners, triangles=((0, 1, 2), (0, 2, 3)))
+        yield said((grains, model.shadow(mesh, 0.05, 0.2), model.cut(mesh, 0.12), model.joined(
+            [((0.0, 0.0), (1.0, 0.0)), ((1.0 + near, 0.0), (2.0, 0.0)), ((3.0, 0.0), (3.0 + near, 0.0))])))  # fmt: skip
 
 
 def joins(draw: random.Random) -> Iterator[str]:

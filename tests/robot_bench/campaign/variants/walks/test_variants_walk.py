@@ -17,7 +17,7 @@ from bluepill_sim.program.static_code import StaticCode
 from bluepill_sim.program.version_difference import LineDifference
 from robot_bench.campaign.last_moment import LastMoment, last_moment
 from robot_bench.campaign.trial import GoalResult, HullContact, Outcome, Trial, TrialVerdict, run_trial, trial_of
-from robot_bench.campaign.variants import changed_back, diversity, fault_line
+from robot_bench.campaign.variants import against, changed_back, diversity, fault_line
 from robot_bench.campaign.variants.against import Against, Other, compared
 from robot_bench.campaign.variants.mutation import report
 from robot_bench.campaign.variants.mutation.interval import share_interval
@@ -225,6 +225,12 @@ def versions(draw: Random) -> Iterator[str]:
         other = Other("b.elf", b"else")
         other.keep(Path(name))
         yield said([Other.of(Path(name)), Other.of(Path(name, "none")), other.sha256[:9]])
+        for found in ([], ["first"], ["first", "second"]):
+            with (
+                mock.patch.object(against, "differences", return_value=found),
+                mock.patch.object(against, "_events", lambda version: version.files[version.firmware_name]),
+            ):
+                yield said(against.first_apart(mine, other))
 
         class Backwards:
             """Workers that end in the other order."""

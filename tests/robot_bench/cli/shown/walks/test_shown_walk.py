@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
+from typing import Any
 
 from bluepill_sim.board import BluePill
 from p2os.view.header import PageSection, PageText
@@ -18,7 +19,7 @@ from robot_bench.cli.debugging.hands import hand_of
 from robot_bench.cli.shown import chip_panels, saved_hands
 from robot_bench.cli.shown.fleet_hands import FleetHands
 from robot_bench.cli.shown.live_fleet import LiveFleet
-from robot_bench.cli.shown.live_run import LiveRun
+from robot_bench.cli.shown.live_run import BenchBuilt, BenchReleased, Happened, LiveRun
 from robot_bench.cli.shown.looked_panels import LOOK_NS, MOST_LOOKS, LookedPanels
 from robot_bench.cli.shown.offered_hands import hands_of
 from robot_bench.cli.shown.targets import run_target, scenario_target
@@ -141,7 +142,14 @@ def live(_draw: Random) -> Iterator[str]:
     """Ask a live run for all that a page may ask for, a command at a look of its clock."""
     states: list[str] = []
     with TemporaryDirectory(prefix="p2os-test-"):
-        run, left, now = LiveRun(SCENARIO, speed=0.5, variables=["head"]), [*ASKED], 0
+        run = LiveRun(SCENARIO, speed=0.5, variables=["head"], on_wait=lambda: states.append("waits"))
+        left, now = [*ASKED], 0
+        offer = run.source.offer
+
+        def offered(happened: Happened, *given: Any, **named: Any) -> None:
+            if not isinstance(happened, BenchBuilt | BenchReleased):
+                states.append(said([happened, given, named]))
+            offer(happened, *given, **named)
 
         def clock() -> int:
             nonlocal now
@@ -157,6 +165,7 @@ def live(_draw: Random) -> Iterator[str]:
             states.append(said(state))
 
         run._clock, run._show = clock, show  # type: ignore[method-assign,assignment]  # each of them
+        run.source.offer = offered  # type: ignore[method-assign]
         run.drive(Bench(SCENARIO, slice_ns=10 * MS))
         yield from states
         run.source.update()
@@ -167,8 +176,9 @@ def live(_draw: Random) -> Iterator[str]:
 def fleet(_draw: Random) -> Iterator[str]:
     """Ask robots of one world for all that a page may ask for."""
     scenario = load_scenario("two-dodge").with_options(duration_s=0.25)
-    run, left, now = LiveFleet(scenario, speed=0.3), [*FLEET], 0
     states: list[str] = []
+    run = LiveFleet(scenario, speed=0.3, on_wait=lambda: states.append("waits"))
+    left, now = [*FLEET], 0
 
     def clock() -> int:
         nonlocal now

@@ -17,7 +17,15 @@ from robot_bench.report.explain import explain as explaining
 from robot_bench.report.explain import findings
 from robot_bench.report.explain.chain import ChainLink, Evidence, Explanation, Standing
 from robot_bench.report.explain.contact import ContactAnalysis, exchanged
-from robot_bench.report.explain.probing import Codes, InputEffect, Prober, SensorResponse, first_row, parted
+from robot_bench.report.explain.probing import (
+    SAME_NS,
+    Codes,
+    InputEffect,
+    Prober,
+    SensorResponse,
+    first_row,
+    parted,
+)
 from robot_bench.report.explain.progress import ProgressAnalysis
 from robot_bench.report.explain.replay import ChipReplay, ChipReset, Hold, ReplayPart, SourcePlace
 from robot_bench.report.explain.scene import Scene
@@ -300,6 +308,47 @@ def parts_of_findings(draw: Random) -> Iterator[str]:
     yield said([findings.numbers(names) for names in ([], ["a"], ["a", "b"], ["a", "b", "c"])])
 
 
+def bounds(_draw: Random) -> Iterator[str]:
+    """Look one nanosecond before, at and behind each time that findings wait for, and at wheels that are off."""
+    settled = findings.SETTLED_NS
+    still = poses((0.0, STILL), until_s=12.0)
+    record = replace(driven_run((0.0, STILL), (2.0, AHEAD), until_s=12.0), poses=still)
+    for at in (2 * S, 2 * S + settled - 1, 2 * S + settled, 2 * S + settled + 1):
+        steps: list[ChainLink] = []
+        yield f"{at} {findings.obeyed(record, 0.0625, at, steps)} {' '.join(step_lines(steps))}"
+    at = 6 * S
+    for ns in (40 * MS, 250 * MS):
+        for by in (-1, 0, 1):
+            alone = replace(record, poses=[replace(still[0], t=at - ns + by)])
+            yield f"{ns} {by} {findings.obeyed(alone, 0.0625, at, [])}"
+    for off in (0.0399, 0.04, 0.0401, 0.1, 0.10001):
+        for step in (0.05, 0.2):
+            slow = replace(record, poses=[replace(still[0], t=at - 50 * MS, left=round((3 * step - off) * 1e6))])
+            slow.poses[0] = replace(slow.poses[0], right=round(3 * step * 1e6))
+            yield f"{off} {step} {findings.obeyed(slow, step, at, [])}"
+    yield from seen_alone()
+    hits = [Contact(t=t, what=f"'{t}'", x_m=1.0, y_m=0.0) for t in (3 * S, 5 * S)]
+    for end in ({}, {"goals_met": ["a"]}, {"failures": ["reach: x"]}):
+        found = driven_run((0.0, AHEAD), until_s=12.0, contacts=hits, end=end)
+        yield explaining.explain(found, None).text()
+    for way, until in (([(0, AHEAD), (10, STILL)], 15), ([(0, AHEAD), (7 * MS, STILL)], 10 * MS), ([(5, SPIN)], 9)):
+        for by in (-1, 0, 1):
+            yield findings.held_codes(way, until + SAME_NS + by)
+
+
+def seen_alone() -> Iterator[str]:
+    """Hold one sensor's pin high by a fault, of programs that drive on by one step, or not, with and without it."""
+    for codes in ((1, 1), (1, 2), (0, 1), (2, 0)):
+        for alone_high in (STILL, (1, 1), (-1, 2), (1, 0)):
+            run = driven_run((0.0, AHEAD), until_s=12.0, on={"DD4": 3.0},
+                             faults=[Fault(t=2 * S, op="inject", words="sonar-stuck 4 0.2")])  # fmt: skip
+            response = SensorResponse(at=0, base=codes, codes=alone_high, noticed=None, answered=None)
+            prober = AskedProber(AskedReplay(run, 12 * S, 12 * S), answered={0: dict.fromkeys(DISTANCES, response)})
+            prober.later = dict.fromkeys(DISTANCES, response)
+            analysis = ProgressAnalysis(Scene(run), prober, run.last_ns)  # type: ignore[arg-type]
+            yield f"{codes} {alone_high} {analysis._sees_what_is_not(6 * S)} {' | '.join(step_lines(analysis.steps))}"
+
+
 def exchanges(draw: Random) -> Iterator[str]:
     """Say of answers which two sensors, or sides, are exchanged, where that is sure."""
 
@@ -452,7 +501,7 @@ def probes(draw: Random) -> Iterator[str]:
 
 TRACES: dict[str, Trace] = {
     "contacts": contacts, "stays": stays, "others": others, "parts": parts_of_findings, "exchanges": exchanges,
-    "scenes": scenes, "probes": probes, "replays": replays,
+    "scenes": scenes, "probes": probes, "replays": replays, "bounds": bounds,
 }  # fmt: skip
 for _package in ("report", "report.explain", "view"):
     TRACES[f"declared in {_package}"] = declared_of(f"robot_bench.{_package}")

@@ -39,6 +39,19 @@ def left_at(one: Esp32) -> str:
     return VERSION.sub("adapter VERSION", sent)
 
 
+def power_cycle(one: Esp32) -> Iterator[str]:
+    """Take the power from a machine and give it back; each time a pad asks for it, and both ports are sent bytes."""
+    for power in (one.power_off, one.power_on):
+        power()
+        yield said([one.is_running, one.connect_pad(1, is_found=True), one.connect_pad(2, is_found=False)])
+        one.disconnect_pad()
+        one.receive(CONSOLE, b"ab")
+        one.receive(ROBOT, bytes(40))
+        yield said([[*arriving] for arriving in one._arriving])
+        one.run_until(one.now_us + 2_000)
+        yield f"{state_of(one)} {left_at(one)}"
+
+
 def machines(draw: Random) -> Iterator[str]:  # noqa: C901 - one thing that may happen after the other
     """Let machines take turns: type, send, stall, pull EN, change pads, break the flash, and let a pad come and go."""
     boards = [Esp32(), Esp32(), Esp32(library_path(max(PARTS)))]
@@ -66,9 +79,12 @@ def machines(draw: Random) -> Iterator[str]:  # noqa: C901 - one thing that may 
         elif what == 10:
             one.disconnect_pad()
             yield f"pad {one.pad()}"
+        yield said([[*arriving][-3:] for arriving in one._arriving])
         one.run_until(now + draw.choice((0, 1, 87, 1_000, 9_999, 10_000, 150_000, 1_500_000)))
         yield f"{boards.index(one)} {what} {state_of(one)} {left_at(one)}"
     yield said([one.stack_used > 0 for one in boards if one.is_running])
+    for one in boards:
+        yield from power_cycle(one)
     yield tried(library_path, "rev-z")
 
 
