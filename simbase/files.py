@@ -84,6 +84,8 @@ def writing(place: object, hint: str | None = None) -> Iterator[None]:
     except OSError as error:
         if hint is None and isinstance(error, (FileNotFoundError, IsADirectoryError, NotADirectoryError)):
             hint = "give a file in a folder that exists"
+        elif hint is None and isinstance(error, PermissionError):
+            hint = "name a place that you may write to"
         elif hint is None or error.errno in _HINTS:
             hint = hint_of(error)
         raise FileError(f"cannot write {shown_name(place)}: {reason_of(error)}", hint=hint) from error

@@ -11,7 +11,16 @@ from pathlib import Path
 import pytest
 
 from simbase.errors import FileError, P2osError
-from simbase.files import lines_of, open_to_write, open_to_write_text, read_bytes, read_text, replacing, write_text
+from simbase.files import (
+    lines_of,
+    open_to_write,
+    open_to_write_text,
+    read_bytes,
+    read_text,
+    replacing,
+    write_text,
+    writing,
+)
 from tests.test_architecture import module_name, sources
 
 READERS: dict[str, Callable[[Path, int], object]] = {
@@ -221,6 +230,15 @@ def test_what_is_no_plain_file_is_written_itself(tmp_path: Path) -> None:
     assert file.read_text() == "new"
     with replacing(Path("/dev/null")) as part:
         assert part == Path("/dev/null")
+
+
+def test_a_place_that_one_may_not_write_to_has_a_hint() -> None:
+    with pytest.raises(FileError, match="cannot write x: permission denied") as caught, writing("x"):
+        raise OSError(errno.EACCES, os.strerror(errno.EACCES))
+    assert caught.value.hint == "name a place that you may write to"
+    with pytest.raises(FileError) as caught, writing("x", hint="another"):
+        raise OSError(errno.EACCES, os.strerror(errno.EACCES))
+    assert caught.value.hint == "another"
 
 
 @pytest.mark.parametrize("kind", [OSError, KeyboardInterrupt])
