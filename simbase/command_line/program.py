@@ -8,9 +8,11 @@ import contextlib
 import difflib
 import errno
 import gc
+import os
 import sys
 import traceback
 from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
 
 import typer
 
@@ -21,6 +23,9 @@ from simbase.user_classes import unforeseen
 
 EXIT_FAILED = 1
 EXIT_INTERRUPTED = 130
+
+#: Where output goes that nobody takes.
+NOWHERE = Path(os.devnull)
 
 #: chosen: objects made between two searches for garbage; a capture's are tuples by the thousand, and none is garbage.
 COLLECTED_AFTER = 20_000
@@ -47,10 +52,26 @@ def main(run_words: Callable[..., int], arguments: Sequence[str] | None = None) 
     """
     words = list(sys.argv[1:] if arguments is None else arguments)
     trace = "--trace" in words
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:  # closed by who called: `p2os world list >&-`
+            setattr(sys, name, NOWHERE.open("w", encoding="utf-8"))
     end_on_signals()
-    code = run_words([word for word in words if word != "--trace"], trace=trace)
-    ignore_signals()  # a robot that was not released before is when Python ends, and the exit code stands
-    sys.exit(code)
+    try:
+        code = run_words([word for word in words if word != "--trace"], trace=trace)
+        ignore_signals()  # a robot that was not released before is when Python ends, and the exit code stands
+        sys.exit(code)
+    finally:
+        _leave_unwritten()
+
+
+def _leave_unwritten() -> None:
+    """Have Python not write once more, as it ends, what could not be written: its exit code would be 120."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except (OSError, ValueError):
+            with contextlib.suppress(OSError, ValueError), NOWHERE.open("wb") as nowhere:
+                os.dup2(nowhere.fileno(), stream.fileno())
 
 
 def run(program: str, make_app: Maker, words: Sequence[str], *, trace: bool = False) -> int:
@@ -141,6 +162,9 @@ def _run(program: str, make_app: Maker, words: list[str], *, trace: bool) -> int
             gc.set_threshold(COLLECTED_AFTER, 10, 10)
             gc.enable()
         result = command.main(words, prog_name=program, standalone_mode=False)
+        sys.stdout.flush()
+    except BrokenPipeError:  # nobody reads it any more
+        return EXIT_FAILED
     except (KeyboardInterrupt, typer.Abort):
         result = EXIT_INTERRUPTED
     except Exception as error:  # noqa: BLE001 - the one place where every error becomes a line

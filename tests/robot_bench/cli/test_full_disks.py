@@ -4,8 +4,10 @@ The limit of the size of a file stands in for a full disk: a write fails in the 
 """
 
 import json
+import os
 import shutil
 import subprocess
+import sys
 from importlib.resources import files
 from pathlib import Path
 
@@ -159,6 +161,26 @@ def test_a_full_standard_output_is_no_bug(verb: str, place: Path) -> None:
         )  # fmt: skip
     refused(done)
     assert "no space left on device" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("where", "code", "said"),
+    [
+        (">/dev/full", 1, "p2os: cannot write standard output: no space left on device\nhint: "),
+        (">&-", 0, "45 packets"),
+        ("| true", 1, ""),
+    ],
+)
+def test_output_that_is_written_when_a_verb_has_ended_is_no_bug(where: str, code: int, said: str, place: Path) -> None:
+    """As in most shells: where PYTHONUNBUFFERED is set, each line is written at once."""
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    line = f'( "{sys.executable}" -m p2os decode c; echo $? >code ) {where}'
+    done = subprocess.run(
+        ["sh", "-c", line], cwd=place, env=environment, stderr=subprocess.PIPE, text=True, check=False, timeout=60
+    )
+    assert (place / "code").read_text() == f"{code}\n"
+    assert done.stderr.startswith(said)
+    assert len(done.stderr.splitlines()) == (2 if code and said else bool(said))
 
 
 @pytest.mark.parametrize(
