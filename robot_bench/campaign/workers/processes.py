@@ -11,7 +11,6 @@ own, `ERROR`. A fork whose parent is gone ends at its next slice.
 Invariant: what comes of a trial depends on the trial alone, not on how many run at a time, nor on their order.
 """
 
-import contextlib
 import gc
 import math
 import os
@@ -91,8 +90,10 @@ class Processes:
                         worked, goes_on = _result(process, pipe, self._limits)
                         if goes_on and waiting:
                             running[pipe] = (*waiting.pop(), process)
-                        with contextlib.suppress(OSError):  # it has ended: its result tells why
+                        try:
                             pipe.send(running[pipe][0] if pipe in running else None)
+                        except OSError:  # it has ended, and its result tells why; or it would wait for ever
+                            process.kill()
                         if pipe not in running:
                             pipe.close()
                             process.join()
@@ -132,8 +133,10 @@ def _serve(
         found, is_sound = _limited(works[place], limits, look)
         before_s, spent_s = spent_s, _cpu_s()
         goes_on = is_sound and left > 0
-        with contextlib.suppress(OSError):  # nobody waits for it any more
+        try:
             pipe.send(((found, round(spent_s - before_s, 3)), goes_on))
+        except OSError:  # nobody waits for it any more; or the system does not take it, and it is done again
+            os.kill(os.getpid(), signal.SIGKILL)
         place = _next_place(pipe, parent) if goes_on else None
     pipe.close()
 
