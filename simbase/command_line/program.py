@@ -18,7 +18,7 @@ import typer
 
 from simbase.command_line.refused_connections import shown_refusals
 from simbase.command_line.signals import end_on_signals, ignore_signals, restored_signals
-from simbase.files import REFUSALS, hint_of, reason_of
+from simbase.files import REFUSALS, hint_of, open_to_write, open_to_write_text, reason_of
 from simbase.user_classes import unforeseen
 
 EXIT_FAILED = 1
@@ -54,7 +54,7 @@ def main(run_words: Callable[..., int], arguments: Sequence[str] | None = None) 
     trace = "--trace" in words
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:  # closed by who called: `p2os world list >&-`
-            setattr(sys, name, NOWHERE.open("w", encoding="utf-8"))
+            setattr(sys, name, open_to_write_text(NOWHERE))
     end_on_signals()
     try:
         code = run_words([word for word in words if word != "--trace"], trace=trace)
@@ -70,7 +70,7 @@ def _leave_unwritten() -> None:
         try:
             stream.flush()
         except (OSError, ValueError):
-            with contextlib.suppress(OSError, ValueError), NOWHERE.open("wb") as nowhere:
+            with contextlib.suppress(OSError, ValueError), open_to_write(NOWHERE) as nowhere:
                 os.dup2(nowhere.fileno(), stream.fileno())
 
 
