@@ -143,12 +143,9 @@ class NativeEngine(Engine):
             BAD_ACCESS(guarded(self._bad_access, True, self._fail)),
             WRITE_AT_ONCE(guarded(self._write_at_once, False, self._fail)),
         )  # fmt: skip
-        self._state = state = ctypes.c_void_p(
-            library().core_new(self._core.handle, ctypes.addressof(api), ctypes.addressof(self._calls))
-        )
-        if not state.value:
-            raise MemoryError("no memory for the native core")
-        self.shared = Shared.from_address(state.value)
+        made = library().core_new(self._core.handle, ctypes.addressof(api), ctypes.addressof(self._calls))
+        self._state = state = ctypes.c_void_p(_made(made, "the native core"))
+        self.shared = Shared.from_address(made)
         self.shared.scratch = SCRATCH_BASE
         if isinstance(self._core, InterpreterCore):
             library().core_use_interpreter(state, self._core.handle, is_exact_wanted())
@@ -214,7 +211,7 @@ class NativeEngine(Engine):
         """As of `Engine`."""
         number = len(self._regions)
         self._regions.append((address, size, *io_callbacks(read, write, self._is_denied, self._fail)))
-        user = library().core_region(self._state, number, address)
+        user = _made(library().core_region(self._state, number, address), "a region of the chip")
         self._core.map_io_native(address, size, address_of("core_read_io"), address_of("core_write_io"), user)
 
     def declare_zero(self, address: int) -> None:
@@ -374,8 +371,8 @@ class NativeEngine(Engine):
 
     def _set_recorder(self, recorder: BlockRecorder | None) -> None:
         super()._set_recorder(recorder)
-        if not library().core_start_recording(self._state, 0 if recorder is None else _RECORD_ROOM):
-            raise MemoryError("no memory for a record of blocks")
+        room = 0 if recorder is None else _RECORD_ROOM
+        _made(library().core_start_recording(self._state, room), "a record of blocks")
 
     @property
     def gone_ways(self) -> frozenset[tuple[int, bool]]:
@@ -506,11 +503,10 @@ class NativeEngine(Engine):
             len(rows),
             *compared,
         )
-        if not added:
-            raise MemoryError(f"no memory for the block at {start:#010x}")
+        _made(added, f"the block at {start:#010x}")
         loop = loop_of(code, block.offsets, start)
-        if loop is not None and not library().core_set_loop(self._state, start, ctypes.addressof(loop)):
-            raise MemoryError("no memory for a loop")
+        if loop is not None:
+            _made(library().core_set_loop(self._state, start, ctypes.addressof(loop)), "a loop")
 
     def _note(self, accesses: dict[int, Access]) -> None:
         """Hook these instructions so that C notes their PC, in code that is translated from now on."""
@@ -585,9 +581,21 @@ class NativeTraps(Traps):
     def _trap(self, address: int, number: int, kind: HaltKind) -> None:
         if (address, number, kind) in self._trapped:
             return
+        made = library().core_trap(self._state, address, GENERAL[number].value, HALT_NUMBERS[kind])
+        user = _made(made, f"a look at {address:#010x}")
         self._trapped.add((address, number, kind))
-        user = library().core_trap(self._state, address, GENERAL[number].value, HALT_NUMBERS[kind])
         self._core.hook_native("instruction", address_of("core_on_trap"), user, address, address)
+
+
+def _made(where: int | None, what: str) -> int:
+    """Return where C has made something, or that it has.
+
+    Raises:
+        MemoryError: It had no memory.
+    """
+    if not where:
+        raise MemoryError(f"no memory for {what}")
+    return where
 
 
 def _has_like_access_under_it(block: BasicBlock, accesses: dict[int, Access]) -> bool:
