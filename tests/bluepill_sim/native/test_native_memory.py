@@ -5,6 +5,7 @@ from collections.abc import Callable
 import pytest
 
 from bluepill_sim.core.halts import HaltKind
+from bluepill_sim.extension.library import library as real_library
 from bluepill_sim.native import engine
 from tests.bluepill_sim.machine import Machine
 
@@ -21,7 +22,7 @@ class WithoutMemory:
     """The library, one of whose functions makes nothing."""
 
     def __init__(self, name: str) -> None:
-        self._library, self._name = engine.library(), name
+        self._library, self._name = real_library(), name
 
     def __getattr__(self, name: str) -> object:
         return (lambda *_: None) if name == self._name else getattr(self._library, name)
@@ -32,7 +33,7 @@ def run(_machine: Machine) -> None:
 
 
 def look_at_a_register(machine: Machine) -> None:
-    machine.board.chip.engine._traps._trap(0x08000200, 0, HaltKind.UNALIGNED)  # type: ignore[attr-defined]
+    machine.board.chip.engine._traps._trap(0x08000200, 0, HaltKind.UNALIGNED)
 
 
 @pytest.mark.parametrize(
