@@ -92,7 +92,7 @@ class Processes:
                             running[pipe] = (*waiting.pop(), process)
                         try:
                             pipe.send(running[pipe][0] if pipe in running else None)
-                        except OSError:  # it has ended, and its result tells why; or it would wait for ever
+                        except OSError:  # it has ended, and its result tells why; or it would wait forever
                             process.kill()
                         if pipe not in running:
                             pipe.close()

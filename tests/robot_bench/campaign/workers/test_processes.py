@@ -16,7 +16,7 @@ from robot_bench.campaign.workers.processes import MOST_TRIES, Processes
 #: Looks at what goes on; may end it.
 Look = Callable[[], None]
 SOUND = Outcome(verdict=TrialVerdict.PASSED)
-#: Four pieces of work take a dozen looks; one that waits for ever, as many seconds as `LOOK_S` has it.
+#: Four pieces of work take a dozen looks; one that waits forever, as many seconds as `LOOK_S` has it.
 MOST_LOOKS = 200
 
 
@@ -65,7 +65,7 @@ def test_work_comes_to_its_end_where_the_system_does_not_take_a_message(
     looks = iter(range(MOST_LOOKS))
 
     def look() -> None:
-        assert next(looks, None) is not None, "it waits for ever"
+        assert next(looks, None) is not None, "it waits forever"
 
     monkeypatch.setattr(Connection, "send", refuse)
     found: list[tuple[int, object]] = []
