@@ -11,7 +11,7 @@ import struct
 import weakref
 from collections.abc import Iterator, Sequence
 
-from bluepill_sim.extension.library import library
+from bluepill_sim.extension.library import library, made
 from bluepill_sim.fabric.subscriptions import EDGE
 from simbase.timing import Nanos
 
@@ -32,9 +32,7 @@ class EdgeLog:
 
     def __init__(self, signals: Sequence[int], values: Sequence[int]) -> None:
         self._calls = calls = library()
-        self._log = ctypes.c_void_p(calls.edge_log_new())
-        if not self._log.value:
-            raise MemoryError("no memory for a log of edges")
+        self._log = ctypes.c_void_p(made(calls.edge_log_new(), "a log of edges"))
         weakref.finalize(self, calls.edge_log_free, self._log)
         self._signals = (ctypes.c_uint8 * _SIGNALS)(*signals)
         #: Value of each signal, by its number.
@@ -42,11 +40,12 @@ class EdgeLog:
 
     def put(self, at_ns: Nanos, signal: int, value: int) -> None:
         """Add a row."""
-        self._check(self._calls.edge_log_put(self._log, at_ns, signal, value))
+        made(self._calls.edge_log_put(self._log, at_ns, signal, value), "more edges")
 
     def take(self, rows: bytes) -> None:
         """Take rows of a subscription over."""
-        self._check(self._calls.edge_log_take(self._log, rows, len(rows) // EDGE.size, self._signals, self.last))
+        taken = self._calls.edge_log_take(self._log, rows, len(rows) // EDGE.size, self._signals, self.last)
+        made(taken, "more edges")
 
     def write(self, path: bytes, codes: list[str], first_word: int, span: tuple[Nanos, Nanos]) -> None:
         """Append the changes to a value change dump.
@@ -69,8 +68,3 @@ class EdgeLog:
         flags = (ctypes.c_uint8 * _SIGNALS)()
         self._calls.edge_log_used(self._log, flags)
         return {signal for signal, flag in enumerate(flags) if flag}
-
-    @staticmethod
-    def _check(is_done: bool) -> None:
-        if not is_done:
-            raise MemoryError("no memory for more edges")

@@ -261,6 +261,17 @@ def library() -> Any:
     return found
 
 
+def made(where: int | None, what: str) -> int:
+    """Return where C has made something, or that it has.
+
+    Raises:
+        MemoryError: It had no memory.
+    """
+    if not where:
+        raise MemoryError(f"no memory for {what}")
+    return where
+
+
 def address_of(name: str) -> ctypes.c_void_p:
     """Return a function of the library as a callback for Unicorn."""
     return ctypes.cast(library()[name], ctypes.c_void_p)

@@ -27,7 +27,7 @@ from bluepill_sim.extension.layout import (
     packing,
     structure,
 )
-from bluepill_sim.extension.library import library
+from bluepill_sim.extension.library import library, made
 from bluepill_sim.extension.windows import NO_TIME
 from bluepill_sim.fabric.subscriptions import EDGE
 from simbase.c_library import guarded
@@ -185,15 +185,10 @@ class Fabric(Stateful):
             _NOTHING(self._guarded(self._lose_memory, None)),
         )
         #: `struct fabric`, for the native core.
-        self.handle = ctypes.c_void_p(
-            calls.fabric_new(
-                ctypes.addressof(self._callbacks),
-                ctypes.addressof(self.port_structs),
-                ctypes.addressof(self.wave_structs),
-            )
+        fabric = calls.fabric_new(
+            ctypes.addressof(self._callbacks), ctypes.addressof(self.port_structs), ctypes.addressof(self.wave_structs)
         )
-        if not self.handle.value:
-            raise MemoryError("no memory for the fabric")
+        self.handle = ctypes.c_void_p(made(fabric, "the fabric"))
         weakref.finalize(self, calls.fabric_free, self.handle)
         #: `struct analog`: write it between two runs, behind a call of `inputs_change`.
         self.analog_struct: Any = AnalogStruct(vdda_uv=VDDA_UV, temperature_mc=TEMPERATURE_MC)

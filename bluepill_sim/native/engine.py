@@ -53,6 +53,7 @@ from bluepill_sim.extension.library import (
     is_exact_wanted,
     is_interpreter_wanted,
     library,
+    made,
 )
 from bluepill_sim.extension.windows import NO_TIME, field, flag
 from bluepill_sim.native.interpreter_core import InterpreterCore
@@ -143,9 +144,9 @@ class NativeEngine(Engine):
             BAD_ACCESS(guarded(self._bad_access, True, self._fail)),
             WRITE_AT_ONCE(guarded(self._write_at_once, False, self._fail)),
         )  # fmt: skip
-        made = library().core_new(self._core.handle, ctypes.addressof(api), ctypes.addressof(self._calls))
-        self._state = state = ctypes.c_void_p(_made(made, "the native core"))
-        self.shared = Shared.from_address(made)
+        core = library().core_new(self._core.handle, ctypes.addressof(api), ctypes.addressof(self._calls))
+        self._state = state = ctypes.c_void_p(made(core, "the native core"))
+        self.shared = Shared.from_address(core)
         self.shared.scratch = SCRATCH_BASE
         if isinstance(self._core, InterpreterCore):
             library().core_use_interpreter(state, self._core.handle, is_exact_wanted())
@@ -211,7 +212,7 @@ class NativeEngine(Engine):
         """As of `Engine`."""
         number = len(self._regions)
         self._regions.append((address, size, *io_callbacks(read, write, self._is_denied, self._fail)))
-        user = _made(library().core_region(self._state, number, address), "a region of the chip")
+        user = made(library().core_region(self._state, number, address), "a region of the chip")
         self._core.map_io_native(address, size, address_of("core_read_io"), address_of("core_write_io"), user)
 
     def declare_zero(self, address: int) -> None:
@@ -372,7 +373,7 @@ class NativeEngine(Engine):
     def _set_recorder(self, recorder: BlockRecorder | None) -> None:
         super()._set_recorder(recorder)
         room = 0 if recorder is None else _RECORD_ROOM
-        _made(library().core_start_recording(self._state, room), "a record of blocks")
+        made(library().core_start_recording(self._state, room), "a record of blocks")
 
     @property
     def gone_ways(self) -> frozenset[tuple[int, bool]]:
@@ -503,10 +504,10 @@ class NativeEngine(Engine):
             len(rows),
             *compared,
         )
-        _made(added, f"the block at {start:#010x}")
+        made(added, f"the block at {start:#010x}")
         loop = loop_of(code, block.offsets, start)
         if loop is not None:
-            _made(library().core_set_loop(self._state, start, ctypes.addressof(loop)), "a loop")
+            made(library().core_set_loop(self._state, start, ctypes.addressof(loop)), "a loop")
 
     def _note(self, accesses: dict[int, Access]) -> None:
         """Hook these instructions so that C notes their PC, in code that is translated from now on."""
@@ -581,21 +582,10 @@ class NativeTraps(Traps):
     def _trap(self, address: int, number: int, kind: HaltKind) -> None:
         if (address, number, kind) in self._trapped:
             return
-        made = library().core_trap(self._state, address, GENERAL[number].value, HALT_NUMBERS[kind])
-        user = _made(made, f"a look at {address:#010x}")
+        trap = library().core_trap(self._state, address, GENERAL[number].value, HALT_NUMBERS[kind])
+        user = made(trap, f"a look at {address:#010x}")
         self._trapped.add((address, number, kind))
         self._core.hook_native("instruction", address_of("core_on_trap"), user, address, address)
-
-
-def _made(where: int | None, what: str) -> int:
-    """Return where C has made something, or that it has.
-
-    Raises:
-        MemoryError: It had no memory.
-    """
-    if not where:
-        raise MemoryError(f"no memory for {what}")
-    return where
 
 
 def _has_like_access_under_it(block: BasicBlock, accesses: dict[int, Access]) -> bool:

@@ -22,7 +22,7 @@ from bluepill_sim.core.unicorn_core import (
     UnicornCore,
 )
 from bluepill_sim.extension.layout import NOWHERE, VIEWS_BASE
-from bluepill_sim.extension.library import UNICORN_FUNCTIONS, library
+from bluepill_sim.extension.library import UNICORN_FUNCTIONS, library, made
 
 _EVERYWHERE = 1 << 32
 
@@ -53,10 +53,7 @@ class InterpreterCore(UnicornCore):
         """Make a core without memory, but for the scratch page."""
         self._library: Any = InterpreterFunctions()
         self._on_failure = on_failure
-        handle = library().interpreter_new()
-        if not handle:
-            raise MemoryError("no memory for the interpreter")
-        self._handle = handle
+        self._handle = handle = made(library().interpreter_new(), "the interpreter")
         self._keep: list[object] = []
         self._buffers: list[object] = []
         self._sinks: dict[int, object] = {}

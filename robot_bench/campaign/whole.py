@@ -29,7 +29,7 @@ from robot_bench.campaign.trial import Done, Trial
 from robot_bench.campaign.variants.against import FOLDER as AGAINST
 from robot_bench.campaign.variants.against import Other
 from simbase.errors import FileError, P2osError, UsageError
-from simbase.files import write_text, writing
+from simbase.files import replace_text, write_text, writing
 from simbase.timing import Nanos
 from simbase.trust import Trust
 
@@ -83,14 +83,11 @@ def begin(
             if found.corpus_file is not None:
                 kept["corpus"] = os.path.relpath(found.corpus_file.resolve(), folder.resolve())
                 write_corpus(folder / BEGUN, found.corpus)
-            whole = folder / f"{file.stem}.part"
-            whole.write_text(toml_text(kept), encoding="utf-8")
-            whole.replace(folder / f"{file.stem}.toml")
+            replace_text(folder / f"{file.stem}.toml", toml_text(kept))
     except BaseException:
         for part in (SCENARIO, AGAINST):  # it was empty before
             shutil.rmtree(folder / part, ignore_errors=True)
         with contextlib.suppress(OSError):
-            (folder / f"{file.stem}.part").unlink(missing_ok=True)
             (folder / BEGUN).unlink(missing_ok=True)
         raise
     return load_campaign(folder / f"{file.stem}.toml", trust=Trust(keys=found.trial.trusted))

@@ -137,10 +137,11 @@ class Judge:
                 continue
             one = self._asked(changed, asked, marked, budget_s)
             seconds += one.seconds
-            if one.verdict in NOTICED or found.verdict is not MutantStatus.UNDECIDED:
-                found = found if one.verdict is MutantStatus.UNTESTED else one
             if one.verdict in NOTICED:
+                found = one
                 break
+            if one.verdict is not MutantStatus.UNTESTED and found.verdict is not MutantStatus.UNDECIDED:
+                found = one
         return replace(found, seconds=seconds)
 
     def _asked(self, changed: dict[str, bytes], files: Sequence[str], marked: str, budget_s: float) -> MutantOutcome:
