@@ -1,60 +1,112 @@
 """Repeat the tests that read a real clock while the machine is busy: `python -m tests.tools.suite.steady [PATH …]`.
 
-    make steady                      twenty times, eight processes beside it that never wait
+    make steady                      twenty times, at a load of 8
     make steady STEADY="--times 3 tests/p2os/client"
 
-Prints after each round what has failed and why, and at the end each of them with how often; exit code 1 where one has.
-None of them is left out for it.
+One run collects once and goes through all tests so many times, one round after the other; workers and processes that
+never wait make the load, which is printed as it was measured. Prints at the end what has failed, why and how often;
+exit code 1 where a test has. None is left out for it.
 """
 
 import argparse
 import re
 import subprocess
 import sys
+import threading
 from collections import Counter
 from contextlib import ExitStack
+from copy import copy
 from pathlib import Path
+from statistics import mean
+from typing import Self
+
+import pytest
 
 ROOT = Path(__file__).resolve().parents[3]
 BUSY = "while True: pass"
 FAILED = re.compile(r"^(?:FAILED|ERROR) (\S+).*$", re.MULTILINE)
+#: Of the processes that make the load so many run tests; these wait, too, so one more than the rest would be is busy.
+WORKERS = 5
+#: How often the load is looked at.
+LOOK_S = 1.0
+#: What the runs below are told by.
+OPTION = "--times"
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the option that main() gives."""
+    parser.addoption(OPTION, type=int, default=1, help="how often each test runs")
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Have all tests run again and again: pytest takes down what a test has made where another object follows it."""
+    again: list[pytest.Item] = []
+    for _ in range(config.getoption(OPTION) - 1):
+        for item in items:
+            twin = copy(item)
+            if isinstance(twin, pytest.Function):
+                twin._initrequest()
+            again.append(twin)
+    items += again
 
 
 def main() -> int:
     """Run them so often; the exit code."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("paths", nargs="*", default=["tests"])
-    parser.add_argument("--times", type=int, default=20)
-    parser.add_argument("--load", type=int, default=8, help="processes beside them that never wait")
+    parser.add_argument(OPTION, type=int, default=20)
+    parser.add_argument("--load", type=int, default=8, help="how many processes want a processor")
     words = parser.parse_args()
     command = [
-        sys.executable,
-        "-m",
-        "pytest",
-        "-n",
-        "3",
-        "-m",
-        "real_clock and not soak and not hardware",
-        *words.paths,
+        *(sys.executable, "-m", "pytest", "-p", "tests.tools.suite.steady", OPTION, str(words.times)),
+        *("-n", str(WORKERS), "-m", "real_clock and not soak and not hardware", *words.paths),
     ]
-    failed = Counter[str]()
     with ExitStack() as held:
-        for _ in range(words.load):
+        for _ in range(max(words.load - WORKERS + 1, 0)):
             busy = held.enter_context(subprocess.Popen([sys.executable, "-c", BUSY]))
             held.callback(busy.kill)
-        for number in range(1, words.times + 1):
-            done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-            found = list(FAILED.finditer(done.stdout))
-            failed.update(each[1] for each in found)
-            came_to = done.stdout.strip().splitlines()[-1] if done.stdout.strip() else done.stderr.strip()
-            reasons = "".join(f"  {each[0]}\n" for each in found)
-            sys.stdout.write(f"{number} of {words.times}: {came_to}\n{reasons}")
+        load = held.enter_context(Load())
+        done = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True)
+        assert done.stdout is not None
+        said = []
+        for line in done.stdout:
+            said.append(line)
+            sys.stdout.write(line)
             sys.stdout.flush()
-            if done.returncode not in (0, 1):
-                return 1
+        code = done.wait()
+    failed = Counter(each[1] for each in FAILED.finditer("".join(said)))
+    sys.stdout.write(f"load {load.mean:.1f}\n")
     for name, count in failed.most_common():
         sys.stdout.write(f"{name}: failed {count} of {words.times}\n")
-    return 1 if failed else 0
+    return code
+
+
+class Load:
+    """How many processes ran or waited for a processor, while this is entered."""
+
+    def __init__(self) -> None:
+        self._found = [0]
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._look, daemon=True)
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._ended.set()
+        self._thread.join()
+
+    @property
+    def mean(self) -> float:
+        """The mean of what was found."""
+        return mean(self._found[1:] or self._found)
+
+    def _look(self) -> None:
+        while not self._ended.wait(LOOK_S):
+            running = Path("/proc/loadavg").read_text(encoding="ascii").split()[3].partition("/")[0]
+            self._found.append(int(running) - 1)  # this one
 
 
 if __name__ == "__main__":
