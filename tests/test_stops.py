@@ -25,7 +25,7 @@ FEW = ("SIGTERM", "suspend 1 s", "output blocked, SIGINT")
 @pytest.mark.parametrize(
     ("way", "events"),
     [
-        ("Robot", FEW), ("run --port", ("suspend 1 s",)),
+        ("Robot", FEW),
         *(pytest.param(way, EVENTS, marks=pytest.mark.soak)
           for way in ("Robot", "asyncio Robot", "drive --vel", "run --port")),
     ],

@@ -44,7 +44,10 @@ def left(name):
 """
 
 
-@pytest.mark.parametrize("workers", [["-n", "0"], ["-n", "2"]], ids=["one process", "two workers"])
+@pytest.mark.parametrize(
+    "workers",
+    [pytest.param(["-n", "0"], marks=pytest.mark.soak, id="one process"), pytest.param(["-n", "2"], id="two workers")],
+)
 @pytest.mark.parametrize(("ways", "missed"), [("[0, 1]", ([], [])), ("[0, 0]", ([4], [(3, 4)]))], ids=["both", "one"])
 def test_lines_and_branches_that_no_test_of_any_worker_reaches_are_counted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, workers: list[str], ways: str,

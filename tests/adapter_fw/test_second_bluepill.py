@@ -58,7 +58,7 @@ def model_bytes(wanted: Scenario) -> bytes:
     return b"".join(sent)
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_dodge_is_driven_among_obstacles_without_touching_one(tmp_path: Path) -> None:
     bench = second_bench(built("bluepill", tmp_path)[0], scenario("dodge", 5))
     bench.run_until(int(3.9 * NS_PER_S))

@@ -12,6 +12,7 @@ _HEAD = """# The board, simulated
 Circuits of the [adapter board](board.md) in ngspice, with our own behavioural models, built from the netlist.
 No board exists: these are consequences of data sheets, not measurements.
 
+<!-- soak: every circuit, which the test below simulates too -->
 ```sh
 python -m hardware.pcb simulate     # run all, renew the plots, write this page
 ```

@@ -131,8 +131,8 @@ def set_of(whole: Whole) -> list[tuple[object, ...]]:
 
 
 #: Loading the library takes a second or more, and ribs compiles itself; of those alike one is enough for each run.
-SLOW = {"cma-es", "quality-diversity", "sobol", "coverage"}
-OF_SOAK = {"tpe", "latin-hypercube", "grid"}
+SLOW = {"quality-diversity", "sobol", "coverage"}
+OF_SOAK = {"cma-es", "tpe", "latin-hypercube", "grid"}
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ NAMES = 17
 SAMPLE = 4
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_of_a_few_robots_the_intervals_hold_what_was_planted() -> None:
     """Of 4 robots: 95 % of 4 hold, fewer than 2 in one of 2000 times."""
     found = coverage("rounded", range(1000, 1000 + SAMPLE))

@@ -123,7 +123,7 @@ distance_m = 0.1
 """
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_the_step_of_the_motors_decides_how_far_they_drive_whatever_the_number_of_workers(p2os, capsys) -> None:
     Path("mine.toml").write_text(SCENARIO, encoding="utf-8")
     words = ["sensitivity", "mine.toml", "--vary", "direct.step_mm_s=40.0..80.0", "--vary", "threshold_m=0.4..0.8",

@@ -19,7 +19,7 @@ from tests.robot_bench.direct.robots import rover
 MM = 1000
 #: The first leg and its corner on the kinematic body are in the tests that `p2os new --robot rover` writes.
 BODIES = [
-    pytest.param("kinematic", marks=pytest.mark.slow),
+    pytest.param("kinematic", marks=pytest.mark.soak),
     pytest.param("bullet", marks=[pytest.mark.soak, pytest.mark.bullet]),
 ]
 #: "rover: left 299 right 299 mm/s, 12352 mV"

@@ -141,7 +141,7 @@ def rows() -> list[tuple[int, str, object]]:
 
 WHOLE = lines()
 ROWS = rows()
-SAMPLE = Random(36).sample(ROWS, 120)
+SAMPLE = Random(36).sample(ROWS, 60)
 
 
 def look(folder: Path, number: int, changed: object) -> None:

@@ -181,8 +181,8 @@ def test_a_data_file_that_is_left_out_of_a_wheel_is_named(tmp_path: Path) -> Non
     assert left_out("p2os", wheel) == ["p2os/capture/p2os.lua"]
 
 
-#: Tests of the emulator that take little: of images, of code that is not run, of variables.
-OF_THE_EMULATOR = ("alterations", "image", "static_code", "variables")
+#: Tests of the emulator that take little.
+OF_THE_EMULATOR = ("image",)
 
 
 def shortest_tests(place: Path, *names: str) -> Path:
@@ -302,7 +302,10 @@ def test_a_part_that_is_not_wanted_leaves_its_reason(emulator: Path, tmp_path: P
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("platform", "ending"), [("macosx_11_0_arm64", "so"), ("win_amd64", "pyd")])
+@pytest.mark.parametrize(
+    ("platform", "ending"),
+    [pytest.param("macosx_11_0_arm64", "so", marks=pytest.mark.soak), ("win_amd64", "pyd")],
+)
 def test_a_wheel_for_another_machine_has_its_tag_and_the_ending_of_its_libraries(
     emulator: Path, tmp_path: Path, platform: str, ending: str
 ) -> None:

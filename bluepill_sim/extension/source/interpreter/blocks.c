@@ -165,6 +165,12 @@ static struct block *decoded(struct interpreter *s, uint32_t address, const uint
     return block;
 }
 
+/* Tells whether other code stands there now; also where there was no memory for what stood there. */
+static bool has_changed(const struct block *block, const uint8_t *code)
+{
+    return block->code == NULL || memcmp(block->code, code, block->end - block->start) != 0;
+}
+
 /* The block where the core stands, decoded if it is new or has changed; null: the run ends. */
 struct block *interpreter_block(struct interpreter *s, uint32_t address)
 {
@@ -179,7 +185,7 @@ struct block *interpreter_block(struct interpreter *s, uint32_t address)
         return NULL;
     }
     block = odd_block(s, address);
-    if (block != NULL && block->is_writable && memcmp(block->code, code, block->end - block->start) != 0) {
+    if (block != NULL && block->is_writable && has_changed(block, code)) {
         interpreter_drop(s, block->start, block->end);
         block = NULL;
     }

@@ -82,7 +82,8 @@ def test_a_live_run_has_the_rows_of_its_trace(alone: Path, tmp_path: Path) -> No
 @pytest.mark.slow
 @pytest.mark.parametrize("pages", [
     pytest.param([], marks=pytest.mark.soak, id="none"), pytest.param([True], marks=pytest.mark.soak, id="one"),
-    pytest.param([True, True, True], id="three"), pytest.param([False], marks=pytest.mark.soak, id="a stalled one"),
+    pytest.param([True, True, True], marks=pytest.mark.soak, id="three"),
+    pytest.param([False], marks=pytest.mark.soak, id="a stalled one"),
     pytest.param([True, False], id="one and a stalled one"),
 ])  # fmt: skip
 def test_the_trace_is_the_same_whoever_looks(pages: list[bool], alone: Path, tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ from robot_bench.experiments.validation.experiments import EXPERIMENTS
 from tests.robot_bench.experiments.validation.planted_errors import PLANTED, Planted, changed, figures_that_report
 
 #: One of each language in every run, that whose compiler takes long beside the slow ones; the others in `make soak`.
-MARKS = {"motor value without a sign": [pytest.mark.slow], "ranges 2 % long": [], "tick 1 % slow": []}
+MARKS = {"motor value without a sign": [pytest.mark.slow], "tick 1 % slow": []}
 
 
 def test_every_planted_error_is_an_edit_of_its_file_as_it_stands() -> None:
