@@ -135,6 +135,14 @@ SLOW = {"quality-diversity", "sobol", "coverage"}
 OF_SOAK = {"cma-es", "tpe", "latin-hypercube", "grid"}
 
 
+def test_what_a_call_sets_takes_the_place_of_the_files_key_by_key(tmp_path: Path) -> None:
+    campaign = begun(tmp_path, search="sobol", budget={"runs": 16}, vary={"threshold_m": [0.5]})
+    assert (campaign.search, campaign.batch) == ("sobol", 4)
+    assert (campaign.budget.runs, campaign.budget.confirmations) == (16, 6)
+    assert campaign.vary.keys() == {"start.heading_deg", "threshold_m"}
+    assert campaign.vary["threshold_m"].choices == (0.5,)
+
+
 @pytest.mark.parametrize(
     "search",
     [

@@ -304,6 +304,12 @@ def test_without_a_swarm_everything_is_on_and_no_dimension_is_added(tmp_path: Pa
     assert len(found.faults) == 1
 
 
+@pytest.mark.parametrize(("at", "value"), [(0.0, 2.0), (0.25, 2.4615), (0.5, 3.2), (0.75, 4.5714), (1.0, 8.0)])
+def test_a_long_tail_is_the_inverse_of_its_distribution(at: float, value: float) -> None:
+    """A bounded Pareto of exponent 1: below a value lies (1 - low / value) / (1 - low / high) of it."""
+    assert Span(2.0, 8.0, is_long_tailed=True).value(at) == value
+
+
 def test_a_long_tail_is_as_rare_as_it_is_long() -> None:
     span = Span(60, 900, 1, is_whole=True, is_long_tailed=True)
     drawn = sorted(int(str(span.value((number + 0.5) / 1000))) for number in range(1000))

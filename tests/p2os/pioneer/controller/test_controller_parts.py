@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import given
@@ -230,3 +231,20 @@ def test_a_bumper_is_pressed_at_the_segment_of_its_bearing_and_none_beside_its_r
         assert bumper_watch._touched(segments, bearing) == 0
     assert bumper_watch._touched(0, 0.0) == bumper_watch._middle(0) == 0
     assert bumper_watch._middle(segments) == {1: 1, 5: 0b100, 6: 0b1000, 7: 0b1000}[segments]
+
+
+@pytest.mark.parametrize(
+    ("wheels_mps", "at"),
+    [((0.01, -0.009), "front"), ((0.01, -0.011), "rear"), ((0.4, -0.4), "front rear"), ((0.0, 0.0), "front rear")],
+)
+def test_a_contact_that_nobody_tells_the_bearing_of_is_where_the_robot_drives(
+    wheels_mps: tuple[float, float], at: str
+) -> None:
+    context = SimpleNamespace(
+        devices=SimpleNamespace(pins=SimpleNamespace(front_pressed=0, rear_pressed=0)),
+        motion=SimpleNamespace(wheels_mps=wheels_mps),
+    )
+    body = SimpleNamespace(in_contact=True, contact_rad=None)
+    flash = SimpleNamespace(number={"frontbumps": 5, "rearbumps": 5}.__getitem__)
+    found = bumper_watch.pressed(context, body, flash)  # type: ignore[arg-type]  # what is asked of them
+    assert found == tuple(bumper_watch._middle(5) * (side in at) for side in ("front", "rear"))
