@@ -29,8 +29,9 @@ ROOT = Path(__file__).resolve().parents[3]
 #: Ends with who has started it, however that ends.
 BUSY = "import os; parent = os.getppid()\nwhile os.getppid() == parent: pass"
 FAILED = re.compile(r"^(?:FAILED|ERROR) (\S+).*$", re.MULTILINE)
-#: Of the processes that make the load so many run tests; these wait, too, so one more than the rest would be is busy.
-WORKERS = 5
+#: Of the processes that make the load so many run tests. These wait, too, but what they start does not: one more than
+#: the rest would be is busy.
+WORKERS = 7
 #: How often the load is looked at.
 LOOK_S = 1.0
 #: How much is shown of a failure.
