@@ -9,6 +9,7 @@ exit code 1 where a test has. None is left out for it.
 """
 
 import argparse
+import os
 import re
 import subprocess
 import sys
@@ -16,19 +17,25 @@ import threading
 from collections import Counter
 from contextlib import ExitStack
 from copy import copy
+from itertools import groupby
 from pathlib import Path
+from random import Random
 from statistics import mean
 from typing import Self
 
 import pytest
 
 ROOT = Path(__file__).resolve().parents[3]
-BUSY = "while True: pass"
+#: Ends with who has started it, however that ends.
+BUSY = "import os; parent = os.getppid()\nwhile os.getppid() == parent: pass"
 FAILED = re.compile(r"^(?:FAILED|ERROR) (\S+).*$", re.MULTILINE)
-#: Of the processes that make the load so many run tests; these wait, too, so one more than the rest would be is busy.
-WORKERS = 5
+#: Of the processes that make the load so many run tests. These wait, too, but what they start does not: one more than
+#: the rest would be is busy.
+WORKERS = 7
 #: How often the load is looked at.
 LOOK_S = 1.0
+#: How much is shown of a failure.
+MOST_TEXT = 3000
 #: What the runs below are told by.
 OPTION = "--times"
 
@@ -40,15 +47,28 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Have all tests run again and again: pytest takes down what a test has made where another object follows it."""
-    again: list[pytest.Item] = []
-    for _ in range(config.getoption(OPTION) - 1):
-        for item in items:
-            twin = copy(item)
-            if isinstance(twin, pytest.Function):
-                twin._initrequest()
-            again.append(twin)
-    items += again
+    """Have all tests run again and again, by files in an order of each round: what runs side by side is not always so.
+
+    pytest takes down what a test has made where another object follows it.
+    """
+    files = [list(tests) for _, tests in groupby(items, lambda item: item.path)]
+    items.clear()
+    for number in range(config.getoption(OPTION)):
+        Random(number).shuffle(files)
+        items += [_twin(item) for tests in files for item in tests]
+
+
+def _twin(item: pytest.Item) -> pytest.Item:
+    made = copy(item)
+    if isinstance(made, pytest.Function):
+        made._initrequest()
+    return made
+
+
+def pytest_runtest_logreport(report: pytest.TestReport) -> None:
+    """Say at once what has failed."""
+    if report.failed and "PYTEST_XDIST_WORKER" not in os.environ:
+        sys.stdout.write(f"\n{report.nodeid}\n{report.longreprtext[-MOST_TEXT:]}\n")
 
 
 def main() -> int:

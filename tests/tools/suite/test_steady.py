@@ -32,7 +32,7 @@ def test_alone(made):
 def test_each_time_a_test_gets_what_it_wants_anew_and_each_failure_is_named(tmp_path: Path) -> None:
     (tmp_path / "test_it.py").write_text(TESTS, encoding="utf-8")
     environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST")}
-    words = ["-p", "tests.tools.suite.steady", "--times", "3", "-p", "no:cacheprovider", "-q", "-rf"]
+    words = ["-p", "tests.tools.suite.steady", "--times", "3", "-p", "no:cacheprovider", "-q"]
     done = subprocess.run(
         [sys.executable, "-m", "pytest", *words, "test_it.py"], cwd=tmp_path,
         env={**environment, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, timeout=60, check=False,
