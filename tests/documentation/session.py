@@ -42,6 +42,8 @@ LIMIT_S = 240.0
 READY_S = 60.0
 ENDING_S = 60.0
 PORTS = 24
+#: What a drive ends with, and how often it is typed, where the machine kept it from real time.
+PAUSED, TRIES = "the program or its machine paused for ", 3
 FAILURES = ("p2os: ", "fault: ", "FAILED ", "FAILED;", "depends: ", "alike until ")
 NAMED_FILE = re.compile(r"^(?:/\*|//|#)\s*(?P<name>[\w./-]+\.(?:c|h|ld|toml|py|yml|yaml))\b")
 TCP = re.compile(r"(?<=tcp:127\.0\.0\.1:)\d+|(?<=--gdb )\d+|(?<=remote :)\d+")
@@ -78,7 +80,7 @@ class Endless:
     hold_s: float = 0.7  # how long one that serves nobody is left to work
     may_end: bool = False  # once its client has left
     ready: str = ""  # what it prints once it can be used; empty: anything
-    busy: str = ""  # what it ends with where the machine kept it from real time: it is typed again, twice at most
+    busy: str = ""  # what it ends with where the machine kept it from real time: it is typed again
 
     def fits(self, words: list[str]) -> bool:
         """Whether the words are this verb with these options."""
@@ -300,14 +302,14 @@ class Session:
             self._finish(["bash", "-c", f"{command}\ncode=$?; pwd > {marker}; exit $code"], line, shown)
             self._cwd = Path(marker.read_text().strip())
             return
-        for is_last in (False, False, True):
+        for left in reversed(range(TRIES)):
             terminal = self._open(command, line, shown, kind, serving)
             self._terminals.append(terminal)
             terminal.wait_until_ready()
             if kind.serves:
                 return
             time.sleep(kind.hold_s)
-            if is_last or not terminal.was_held_up():
+            if not left or not terminal.was_held_up():
                 break
             self._terminals.remove(terminal)
         self._close(terminal)
@@ -336,6 +338,15 @@ class Session:
         return Terminal(line, shown, kind, process, source, places)
 
     def _finish(self, command: list[str], line: str, shown: list[str]) -> None:
+        for _ in range(TRIES):
+            code, text = self._ended(command)
+            if code == 0 or PAUSED not in text:
+                break
+        fails = any(each.startswith(FAILURES) for each in shown)
+        assert (code != 0) == fails, f"{line}: exit code {code}\n{text}"
+        check_output(line, shown, text)
+
+    def _ended(self, command: list[str]) -> tuple[int, str]:
         process = subprocess.Popen(
             command, cwd=self._cwd, env=self._environment(), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT, start_new_session=True,
@@ -346,10 +357,7 @@ class Session:
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
             process.wait()
-        text = output.decode(errors="replace")
-        fails = any(each.startswith(FAILURES) for each in shown)
-        assert (process.returncode != 0) == fails, f"{line}: exit code {process.returncode}\n{text}"
-        check_output(line, shown, text)
+        return process.returncode, output.decode(errors="replace")
 
     def _environment(self) -> dict[str, str]:
         own = {

@@ -1,8 +1,11 @@
 """Running a board until something is so, and talking to it."""
 
+import re
+
 import pytest
 
 from bluepill_sim import BluePill, BluePillError, WaitError
+from bluepill_sim.board import _has_line
 from bluepill_sim.spans import to_nanos
 from simbase.timing import Reason
 from tests.bluepill_sim.machine import listen
@@ -29,6 +32,14 @@ def test_a_span_is_a_number_with_its_unit(text: str | int, ns: int) -> None:
 def test_what_is_no_span_is_refused(text: object) -> None:
     with pytest.raises(BluePillError):
         to_nanos(text)  # type: ignore[arg-type] # on purpose
+
+
+def test_a_line_is_looked_for_beyond_an_empty_one_and_what_does_not_match_is_dropped() -> None:
+    sent = bytearray(b"\nstarting\r\nready\r\nrea")
+    assert _has_line(sent, re.compile("^ready$"))
+    assert sent == b"ready\r\nrea"
+    assert not _has_line(sent, re.compile("^rea$"))
+    assert sent == b"rea"
 
 
 def test_run_for_goes_past_the_edges_of_watched_pins(board: BluePill) -> None:

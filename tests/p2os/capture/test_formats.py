@@ -20,7 +20,7 @@ from p2os.capture import (
     write_recording,
 )
 from p2os.capture.formats.hex_text import write_hex
-from p2os.capture.formats.pcap import PCAPNG_MAGIC
+from p2os.capture.formats.pcap import PCAPNG_MAGIC, SNAP_BYTES, record
 from p2os.errors import LocalProtocolError
 from simbase.errors import FileError
 from simbase.timing import NS_PER_S
@@ -55,6 +55,14 @@ def test_hex_text_keeps_bytes_and_directions(capture: Capture) -> None:
     assert [(chunk.direction, chunk.data) for chunk in again.chunks] == [
         (chunk.direction, chunk.data) for chunk in capture.chunks
     ]
+
+
+@pytest.mark.parametrize("length", [SNAP_BYTES - 2, SNAP_BYTES - 1, SNAP_BYTES])
+def test_a_pcap_keeps_of_a_chunk_what_its_header_says_and_how_long_it_was(length: int) -> None:
+    chunk = Chunk(at_ns=0, direction=Direction.TO_ROBOT, data=bytes(length))
+    _, _, kept, wire = struct.unpack("<IIII", (data := record(chunk))[:16])
+    assert (kept, wire) == (min(length + 1, SNAP_BYTES), length + 1)
+    assert len(data) == 16 + kept
 
 
 def test_a_note_travels_with_a_recording() -> None:

@@ -235,3 +235,8 @@ def test_a_listing_changes_its_units_with_the_packet_that_tells_the_robot(direct
     said_first = said(*(frame.to_bytes() for frame in (sip, identity("p3dx-sh"), sip)), direction=direction)
     metres = [row.fields["x_m"] for row in rows_of(said_first, FollowedReading()) if row.name == "SIP"]
     assert metres == [load_parameters(model).distance_conv_mm for model in ("p2dx", "p3dx-sh")]
+
+
+def test_an_argument_of_a_command_that_no_table_has_is_a_number() -> None:
+    (row,) = rows(said(Command(16, -7).to_frame().to_bytes()))
+    assert any("-7, low byte first" in line for line in lines_of(explain(row, P2OS)))

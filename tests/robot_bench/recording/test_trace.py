@@ -1,7 +1,9 @@
 """The trace is sorted, canonical, hashed, and readable after the process was killed."""
 
+import contextlib
 import errno
 import hashlib
+import io
 import json
 import os
 import signal
@@ -97,7 +99,10 @@ def test_a_full_disk_is_one_line() -> None:
     trace = TraceWriter(Path("/dev/full"))
     with pytest.raises(RunFailedError, match="cannot write /dev/full: No space left on device"):
         trace.meta({})
-    # From then on, whether there is anything to write or not.
+    # From then on, whether there is anything to write or not, and room for it again.
+    with contextlib.suppress(OSError):
+        trace._file.close()
+    trace._file = io.StringIO()
     for again in (partial(trace.take, [], 0), partial(trace.take, [note(3)], 5), partial(trace.meta, {}), trace.flush):
         with pytest.raises(RunFailedError, match="cannot write /dev/full"):
             again()

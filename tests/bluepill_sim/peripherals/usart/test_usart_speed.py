@@ -19,6 +19,11 @@ TEXT = b"ready 1\nready 2\n"
 CORES = ["python", pytest.param("native", marks=pytest.mark.skipif(library_path() is None, reason="not built"))]
 
 
+@pytest.mark.parametrize(("baud", "usual"), [(9408, True), (9407, False), (9792, True), (9793, False)])
+def test_a_usual_speed_is_within_two_percent_of_one(baud: int, usual: bool) -> None:
+    assert is_usual(baud) == usual
+
+
 def sender(brr: int, text: bytes = TEXT) -> str:
     """A program that sets USART1 up at 8 MHz and sends a text, waiting for TXE."""
     start = (
