@@ -72,5 +72,5 @@ class History:
         return [point for point in reversed(self._points) if point.cycle < cycle]
 
     def forget_after(self, cycle: int) -> None:
-        """Drop what was noted at or after a cycle: the machine has gone back."""
+        """Drop what was noted after a cycle: the machine has gone back."""
         self._points = [point for n, point in enumerate(self._points) if not n or point.cycle <= cycle]

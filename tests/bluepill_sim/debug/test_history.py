@@ -62,6 +62,16 @@ def test_a_history_that_was_taken_over_goes_on_as_the_other(before: list[int], a
     assert cycles(ours) == found, "the two share nothing"
 
 
+def test_going_back_to_a_state_keeps_it_and_to_just_before_it_does_not() -> None:
+    machine = FakeMachine()
+    history = History(machine, MOST)
+    machine.run(history, [1_000] * 5)
+    history.forget_after(3_000)
+    assert cycles(history) == [0, 1_000, 2_000, 3_000]
+    history.forget_after(2_999)
+    assert cycles(history) == [0, 1_000, 2_000]
+
+
 def test_states_are_twice_as_far_apart_where_they_are_too_many_and_near_again_after_a_new_beginning() -> None:
     machine = FakeMachine()
     history = History(machine, MOST)

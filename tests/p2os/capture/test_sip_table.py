@@ -8,13 +8,14 @@ from typing import cast
 
 import pytest
 from hypothesis import given, settings
+from hypothesis import strategies as st
 
 pytest.importorskip("numpy")
 
 from p2os.capture import Reading, read_file, rows_of
 from p2os.capture.cells import Cell
 from p2os.capture.chunks import Capture, Chunk, Direction, capture_of
-from p2os.capture.columns.sip_table import sip_tables
+from p2os.capture.columns.sip_table import _rounded, sip_tables
 from p2os.capture.sip_columns import LEADING
 from p2os.capture.sips import sips_of
 from p2os.capture.table import CaptureTable, tables_of, tables_of_sips, write_csv
@@ -199,3 +200,11 @@ def test_export_of_a_large_capture_works_without_numpy(tmp_path: Path, monkeypat
     monkeypatch.setattr("p2os.cli.captures.export.LARGE_BYTES", 0)
     monkeypatch.setitem(sys.modules, "p2os.capture.columns.sip_table", None)
     assert exported(tmp_path / "rows.csv").count("\n") > 20
+
+
+@given(st.lists(st.integers(-(10**9), 10**9), max_size=40))
+def test_a_column_is_rounded_as_a_cell_is_at_the_middle_between_two(halves: list[int]) -> None:
+    import numpy as np
+
+    values = [half / 2e6 for half in halves]
+    assert _rounded(np.array(values, np.float64)).tolist() == [round(value, 6) for value in values]
