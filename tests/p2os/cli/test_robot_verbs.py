@@ -20,6 +20,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from p2os.cli.held_robot import RobotWatch, problem_of
 from p2os.cli.links.bench import LinkBenchmark, lines_of, measure
 from p2os.cli.links.ports import guess
+from p2os.cli.links.scan import _at_first
 from p2os.cli.robots.drive import DriveRequest, carry_out
 from p2os.cli.robots.send import make_command
 from p2os.client import (
@@ -431,3 +432,15 @@ def test_each_way_has_its_own_speed(speeds: tuple[float | None, float | None]) -
     robot = AskedRobot()
     carry_out(DriveRequest(forward_m=1.0, turn_rad=-2.0, speed_mps=speeds[0], rate_radps=speeds[1]), robot)
     assert robot.asked == [("drive", 1.0, speeds[0]), ("turn", -2.0, speeds[1])]
+
+
+@pytest.mark.parametrize(
+    ("url", "asked"),
+    [
+        ("serial:/dev/ttyUSB0", "serial:/dev/ttyUSB0?baud=38400"),
+        ("serial:/dev/ttyUSB0?baud=9600", "serial:/dev/ttyUSB0?baud=9600"),
+        ("tcp:127.0.0.1:8101", "tcp:127.0.0.1:8101"),
+    ],
+)
+def test_a_serial_line_is_asked_at_the_first_speed_unless_its_url_names_one(url: str, asked: str) -> None:
+    assert _at_first(url, (38400, 9600)) == asked
