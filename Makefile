@@ -109,7 +109,7 @@ mutants: setup
 	@$(BIN)/python -m tools.mutants $(FILES) $(if $(SINCE),--since $(SINCE)) $(if $(SAMPLE),--sample $(SAMPLE)) \
 	    $(if $(COUNT),--count $(COUNT)) $(if $(SEED),--seed $(SEED)) $(if $(NOTE),--note)
 
-# Attacks every socket of every verb while wheels are watched, six minutes; ON="serve sniff --attack flood" some of it.
+# Attacks every socket of every verb while wheels are watched, eleven minutes; ON="serve sniff --attack flood" some of it.
 hostile: setup
 	@$(BIN)/python -m tools.hostile $(ON)
 
