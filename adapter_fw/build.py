@@ -191,9 +191,11 @@ def build(name: str, output: Path) -> dict[str, int]:
     """
     target = TARGETS[name]
     objects = {source: _compile(target, source) for source in (*CORE, *target.sources)}
+    beside = output.with_name(f"{output.name}.{os.getpid()}")  # who starts it meanwhile gets the last one
     _run(
-        [target.linker or target.compiler, *target.link, *map(str, objects.values()), *target.after, "-o", str(output)]
+        [target.linker or target.compiler, *target.link, *map(str, objects.values()), *target.after, "-o", str(beside)]
     )
+    beside.replace(output)
     return _size(target, [objects[source] for source in CORE])
 
 

@@ -143,6 +143,10 @@ class Terminal:
             assert time.monotonic() < deadline, f"{self.line}: not ready after {READY_S} s\n{self.text}"
             time.sleep(0.01)
 
+    def is_there(self) -> bool:
+        """Whether it goes on, or may have ended."""
+        return self.kind.may_end or self.process.poll() is None
+
     def was_held_up(self) -> bool:
         """Whether it has ended, and says that the machine was too busy."""
         if not self.kind.busy or self.process.poll() is None:
@@ -307,6 +311,7 @@ class Session:
             self._terminals.append(terminal)
             terminal.wait_until_ready()
             if kind.serves:
+                assert terminal.is_there(), f"{line}: it has ended\n{terminal.text}"
                 return
             time.sleep(kind.hold_s)
             if not left or not terminal.was_held_up():
