@@ -49,7 +49,7 @@ class Lines:
             raise AssertionError(f"not said: {self.lines}")
 
     def _gather(self, stream: Iterator[str]) -> None:
-        with contextlib.suppress(OSError):  # a program that is killed may reset its socket
+        with contextlib.suppress(OSError, ValueError):  # it was killed, or closed under this
             for line in stream:
                 with self._news:
                     self.lines.append(line.rstrip("\n"))
