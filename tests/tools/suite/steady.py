@@ -28,7 +28,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[3]
 #: Ends with who has started it, however that ends.
 BUSY = "import os; parent = os.getppid()\nwhile os.getppid() == parent: pass"
-FAILED = re.compile(r"^(?:FAILED|ERROR) (\S+).*$", re.MULTILINE)
+FAILED = re.compile(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", re.MULTILINE)
 #: Of the processes that make the load so many run tests. These wait, too, but what they start does not: one more than
 #: the rest would be is busy.
 WORKERS = 7
