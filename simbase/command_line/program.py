@@ -84,9 +84,9 @@ def run(program: str, make_app: Maker, words: Sequence[str], *, trace: bool = Fa
         trace: Show where in the program an error arose.
     """
     try:
-        with restored_signals(), shown_refusals(program), _in_a_line(program):
+        with restored_signals(), shown_refusals(program), _in_a_line(program) as shown:
             end_on_signals()
-            return _run(program, make_app, list(words), trace=trace)
+            return _run(program, make_app, list(words), shown, trace=trace)
     except KeyboardInterrupt:  # while the last lines were being written
         return EXIT_INTERRUPTED
 
@@ -129,20 +129,25 @@ def report(program: str, error: Exception, *, trace: bool = False) -> int:
 
 
 @contextlib.contextmanager
-def _in_a_line(program: str) -> Iterator[None]:
-    """Show what the system refuses to a callback of a library in C, which nobody can catch, as any other such error."""
+def _in_a_line(program: str) -> Iterator[list[BaseException]]:
+    """Show what the system refuses to a callback of a library in C, which nobody can catch, as any other such error.
+
+    Yields what was shown so far: the library may then raise an error of its own, which says less.
+    """
     before = sys.unraisablehook
+    shown: list[BaseException] = []
 
     def show(unraisable: "sys.UnraisableHookArgs") -> None:
         error = unraisable.exc_value
         if isinstance(error, MemoryError) or (isinstance(error, OSError) and error.errno in REFUSALS):
             report(program, error)
+            shown.append(error)
         else:
             before(unraisable)
 
     sys.unraisablehook = show
     try:
-        yield
+        yield shown
     finally:
         sys.unraisablehook = before
 
@@ -154,7 +159,7 @@ def _without_memory(error: BaseException | None) -> MemoryError | None:
     return error
 
 
-def _run(program: str, make_app: Maker, words: list[str], *, trace: bool) -> int:
+def _run(program: str, make_app: Maker, words: list[str], shown: list[BaseException], *, trace: bool) -> int:
     try:
         command = typer.main.get_command(make_app(words))
         if not gc.isenabled():
@@ -168,6 +173,8 @@ def _run(program: str, make_app: Maker, words: list[str], *, trace: bool) -> int
     except (KeyboardInterrupt, typer.Abort):
         result = EXIT_INTERRUPTED
     except Exception as error:  # noqa: BLE001 - the one place where every error becomes a line
+        if shown and not hasattr(error, "exit_code"):
+            return EXIT_FAILED
         return report(program, error, trace=trace)
     if result == EXIT_INTERRUPTED:  # the option parser makes it of a KeyboardInterrupt, too
         _print_error(f"{program}: interrupted")

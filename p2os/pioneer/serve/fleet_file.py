@@ -139,7 +139,7 @@ def parse_fleet(text: str, source: str, folder: Path, *, trust: bool | Trust = F
     with placed(where, "robot"):
         return FleetOrder(
             robots=tuple(robots), world=world, body=body, seed=top["seed"], apart=top["apart"],
-            cross_talk=top["cross_talk"], worlds=worlds,
+            cross_talk=top["cross_talk"], worlds=worlds, source=source,
         )  # fmt: skip
 
 

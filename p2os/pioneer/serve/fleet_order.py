@@ -75,6 +75,7 @@ class FleetOrder:
         apart: Each has a copy of the world, without the others.
         cross_talk: Whether sonar hear the pings of the other robots of the world.
         worlds: Folder whose files clients may load as worlds (LOADWORLD); None: only what ships.
+        source: What it was read from, for messages; empty: nothing.
 
     Raises:
         UsageError: There is no robot, or there are too many; two share a port, or a port is no URL; `worlds` is no
@@ -88,6 +89,7 @@ class FleetOrder:
     apart: bool = False
     cross_talk: bool = True
     worlds: Path | None = None
+    source: str = ""
 
     def __post_init__(self) -> None:
         if self.worlds is not None and not is_folder(self.worlds):
@@ -203,6 +205,15 @@ def read_aux(text: str) -> tuple[int, str]:
 
 
 def _starts(order: FleetOrder, world: World, models: Sequence[RobotParameters]) -> tuple[Pose, ...]:
+    try:
+        return _places(order, world, models)
+    except UsageError as error:
+        if not order.source:
+            raise
+        raise UsageError(f"{order.source}: {error}", hint=error.hint) from error
+
+
+def _places(order: FleetOrder, world: World, models: Sequence[RobotParameters]) -> tuple[Pose, ...]:
     given = [robot.at for robot in order.robots]
     if order.apart or len(models) == 1:
         return tuple(

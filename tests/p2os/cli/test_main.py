@@ -17,7 +17,7 @@ import typer
 from p2os.cli import main as cli
 from p2os.errors import TransportError
 from simbase.command_line.signals import restored_signals
-from simbase.errors import FileError
+from simbase.errors import FileError, UsageError
 
 GROUP = "p2os.verbs"
 
@@ -283,3 +283,30 @@ def test_what_is_refused_to_a_callback_in_c_is_one_line(
     assert said == (["p2os: cannot read or write a file or standard output: an error"] if is_in_a_line else [])
     assert len(others) == (not is_in_a_line)
     assert sys.unraisablehook == others.append
+
+
+@pytest.mark.parametrize(
+    ("error", "follows", "code", "last"),
+    [
+        (OSError(errno.EIO, "An error"), RuntimeError("no glyph"), 1, "hint: is the disk sound"),
+        (OSError(errno.EIO, "An error"), UsageError("not so"), 2, "p2os: not so"),
+        (KeyError("x"), RuntimeError("no glyph"), 1, "hint: run it again with --trace"),
+    ],
+)
+def test_what_a_library_in_c_raises_after_a_refusal_to_its_callback_says_no_more(
+    offer: Callable[[object], None], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
+    error: Exception, follows: Exception, code: int, last: str,
+) -> None:  # fmt: skip
+    monkeypatch.setattr(sys, "unraisablehook", lambda _: None)
+
+    class Falling:
+        def __del__(self) -> None:
+            raise error
+
+    def act() -> None:
+        Falling()
+        raise follows
+
+    offer(act)
+    assert cli.run(["act"]) == code
+    assert capsys.readouterr().err.splitlines()[-1].startswith(last)

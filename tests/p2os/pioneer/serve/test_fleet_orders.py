@@ -166,6 +166,15 @@ def test_a_place_that_is_not_free_is_refused(places: list[Pose | None], message:
         start_places(load_world("room"), [P2DX] * len(places), places)
 
 
+def test_a_place_of_a_file_that_is_taken_names_the_file() -> None:
+    text = 'world = "office"\nbody = "kinematic"\n[[robot]]\nat = [0, 0, 0]\n[[robot]]\nat = [0.1, 0, 0]\n'
+    with pytest.raises(UsageError, match=r"^fleet\.toml: robot 2 at 0\.1, 0 would stand in robot 1"):
+        make_fleet(parse_fleet(text, "fleet.toml", Path()))
+    robots = (RobotOrder(port="pty:"), RobotOrder(port="pty:", at=Pose(99, 0, 0)))
+    with pytest.raises(UsageError, match=r"^robot 2 at 99, 0 is not in 'room'"):
+        make_fleet(FleetOrder(robots=robots, body="kinematic"))
+
+
 def test_a_fleet_stands_where_it_is_placed_in_one_world_or_apart() -> None:
     robots = (
         RobotOrder(port="pty:", faults=("wheel-blocked left",)),
