@@ -25,6 +25,8 @@ import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -191,11 +193,9 @@ def build(name: str, output: Path) -> dict[str, int]:
     """
     target = TARGETS[name]
     objects = {source: _compile(target, source) for source in (*CORE, *target.sources)}
-    beside = output.with_name(f"{output.name}.{os.getpid()}")  # who starts it meanwhile gets the last one
-    _run(
-        [target.linker or target.compiler, *target.link, *map(str, objects.values()), *target.after, "-o", str(beside)]
-    )
-    beside.replace(output)
+    linker = target.linker or target.compiler
+    with _replacing(output) as beside:  # who starts it meanwhile gets the last one
+        _run([linker, *target.link, *map(str, objects.values()), *target.after, "-o", str(beside)])
     return _size(target, [objects[source] for source in CORE])
 
 
@@ -212,15 +212,22 @@ def _compile(target: Target, source: Path) -> Path:
     result = OBJECTS / f"{source.stem}-{made_of.hexdigest()[:24]}.o"
     if not result.exists():
         OBJECTS.mkdir(parents=True, exist_ok=True)
-        beside = result.with_suffix(f".{os.getpid()}")
-        if not target.assembler:
-            _run([*command, "-o", str(beside)])
-        elif source.suffix == ".S":
-            _run([*target.assembler, str(source), "-o", str(beside)])
-        else:
-            _compile_and_assemble(target, command, beside)
-        beside.replace(result)
+        with _replacing(result) as beside:
+            if not target.assembler:
+                _run([*command, "-o", str(beside)])
+            elif source.suffix == ".S":
+                _run([*target.assembler, str(source), "-o", str(beside)])
+            else:
+                _compile_and_assemble(target, command, beside)
     return result
+
+
+@contextmanager
+def _replacing(path: Path) -> Iterator[Path]:
+    """Lend a file that takes the place of another when it is whole."""
+    beside = path.with_name(f"{path.name}.{os.getpid()}")
+    yield beside
+    beside.replace(path)
 
 
 def _compile_and_assemble(target: Target, command: list[str], output: Path) -> None:

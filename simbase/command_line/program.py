@@ -91,11 +91,12 @@ def run(program: str, make_app: Maker, words: Sequence[str], *, trace: bool = Fa
         return EXIT_INTERRUPTED
 
 
-def report(program: str, error: Exception, *, trace: bool = False) -> int:
+def report(program: str, error: Exception, *, trace: bool = False, follows: bool = False) -> int:
     """Print on stderr what went wrong and what to try, and return the exit code.
 
     Our own errors, those of the emulator and those of the option parser carry
-    `exit_code`, and a `hint` or a way to get help; anything else is a bug.
+    `exit_code`, and a `hint` or a way to get help; anything else is a bug, or
+    what a library makes of a refusal that was shown before (`follows`).
     """
     if trace:
         traceback.print_exception(error)
@@ -111,6 +112,8 @@ def report(program: str, error: Exception, *, trace: bool = False) -> int:
         _print_error(f"hint: {MAKE_MEMORY}")
         return EXIT_FAILED
     if not isinstance(code, int):
+        if follows:
+            return EXIT_FAILED
         says = unforeseen(error)
         _print_error(f"{program}: {_one_line(says)}")
         is_bug = says.startswith("this is a bug")
@@ -173,9 +176,7 @@ def _run(program: str, make_app: Maker, words: list[str], shown: list[BaseExcept
     except (KeyboardInterrupt, typer.Abort):
         result = EXIT_INTERRUPTED
     except Exception as error:  # noqa: BLE001 - the one place where every error becomes a line
-        if shown and not hasattr(error, "exit_code"):
-            return EXIT_FAILED
-        return report(program, error, trace=trace)
+        return report(program, error, trace=trace, follows=bool(shown))
     if result == EXIT_INTERRUPTED:  # the option parser makes it of a KeyboardInterrupt, too
         _print_error(f"{program}: interrupted")
     return result if isinstance(result, int) else 0

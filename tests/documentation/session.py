@@ -42,8 +42,8 @@ LIMIT_S = 240.0
 READY_S = 60.0
 ENDING_S = 60.0
 PORTS = 24
-#: What a drive ends with, and how often it is typed, where the machine kept it from real time.
-PAUSED, TRIES = "the program or its machine paused for ", 3
+#: What a program ends with where the machine kept it from real time; and how often it is typed then, at most.
+HELD_UP, TRIES = ("the loop lagged", "the program or its machine paused for "), 3
 FAILURES = ("p2os: ", "fault: ", "FAILED ", "FAILED;", "depends: ", "alike until ")
 NAMED_FILE = re.compile(r"^(?:/\*|//|#)\s*(?P<name>[\w./-]+\.(?:c|h|ld|toml|py|yml|yaml))\b")
 TCP = re.compile(r"(?<=tcp:127\.0\.0\.1:)\d+|(?<=--gdb )\d+|(?<=remote :)\d+")
@@ -80,7 +80,6 @@ class Endless:
     hold_s: float = 0.7  # how long one that serves nobody is left to work
     may_end: bool = False  # once its client has left
     ready: str = ""  # what it prints once it can be used; empty: anything
-    busy: str = ""  # what it ends with where the machine kept it from real time: it is typed again
 
     def fits(self, words: list[str]) -> bool:
         """Whether the words are this verb with these options."""
@@ -96,7 +95,7 @@ ENDLESS = (
     Endless(verb="run", given="--gdb", serves=True),
     Endless(verb="p2os-adapter", serves=True),
     Endless(verb="plan_view", serves=True, ready="listening"),
-    Endless(verb="run", given="--port", keys=b"y\n", hold_s=4.0, busy="the loop lagged"),
+    Endless(verb="run", given="--port", keys=b"y\n", hold_s=4.0),
     Endless(verb="view", ready="page: "),
     Endless(verb="record", unless="--for"),
     Endless(verb="monitor", unless="--for", keys=b""),
@@ -149,10 +148,10 @@ class Terminal:
 
     def was_held_up(self) -> bool:
         """Whether it has ended, and says that the machine was too busy."""
-        if not self.kind.busy or self.process.poll() is None:
+        if self.process.poll() is None:
             return False
         self._reader.join()
-        return self.kind.busy in self.text
+        return was_held_up(self.process.returncode, self.text)
 
     def end(self) -> None:
         """Press Ctrl-C where it still runs, and look at what it said and how it ended."""
@@ -345,7 +344,7 @@ class Session:
     def _finish(self, command: list[str], line: str, shown: list[str]) -> None:
         for _ in range(TRIES):
             code, text = self._ended(command)
-            if code == 0 or PAUSED not in text:
+            if not was_held_up(code, text):
                 break
         fails = any(each.startswith(FAILURES) for each in shown)
         assert (code != 0) == fails, f"{line}: exit code {code}\n{text}"
@@ -437,6 +436,11 @@ def in_checkout(line: str, words: list[str]) -> str:
         if slash and re.fullmatch(r"\w+", top) and top != "build" and (ROOT / top).is_dir():
             line = line.replace(word, str(ROOT / word))
     return line
+
+
+def was_held_up(code: int, text: str) -> bool:
+    """Tell whether a program that has ended says that the machine was too busy."""
+    return code != 0 and any(words in text for words in HELD_UP)
 
 
 def check_output(line: str, shown: list[str], text: str) -> None:

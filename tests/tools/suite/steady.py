@@ -9,8 +9,6 @@ exit code 1 where a test has. None is left out for it.
 """
 
 import argparse
-import os
-import re
 import subprocess
 import sys
 import threading
@@ -28,7 +26,6 @@ import pytest
 ROOT = Path(__file__).resolve().parents[3]
 #: Ends with who has started it, however that ends.
 BUSY = "import os; parent = os.getppid()\nwhile os.getppid() == parent: pass"
-FAILED = re.compile(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", re.MULTILINE)
 #: Of the processes that make the load so many run tests. These wait, too, but what they start does not: one more than
 #: the rest would be is busy.
 WORKERS = 7
@@ -43,6 +40,12 @@ OPTION = "--times"
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the option that main() gives."""
     parser.addoption(OPTION, type=int, default=1, help="how often each test runs")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Listen, but in no worker."""
+    if not hasattr(config, "workerinput"):
+        config.pluginmanager.register(Failures(config.getoption(OPTION)))
 
 
 @pytest.hookimpl(trylast=True)
@@ -65,10 +68,23 @@ def _twin(item: pytest.Item) -> pytest.Item:
     return made
 
 
-def pytest_runtest_logreport(report: pytest.TestReport) -> None:
-    """Say at once what has failed."""
-    if report.failed and "PYTEST_XDIST_WORKER" not in os.environ:
-        sys.stdout.write(f"\n{report.nodeid}\n{report.longreprtext[-MOST_TEXT:]}\n")
+class Failures:
+    """A plugin of the process that hears of all tests: says at once what has failed, and at the end how often."""
+
+    def __init__(self, times: int) -> None:
+        self._times = times
+        self._failed = Counter[str]()
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Count it."""
+        if report.failed:
+            self._failed[report.nodeid] += 1
+            sys.stdout.write(f"\n{report.nodeid}\n{report.longreprtext[-MOST_TEXT:]}\n")
+
+    def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
+        """Show the table."""
+        for name, count in self._failed.most_common():
+            terminalreporter.write_line(f"{name}: failed {count} of {self._times}")
 
 
 def main() -> int:
@@ -78,27 +94,18 @@ def main() -> int:
     parser.add_argument(OPTION, type=int, default=20)
     parser.add_argument("--load", type=int, default=8, help="how many processes want a processor")
     words = parser.parse_args()
+    workers = min(WORKERS, words.load)
     command = [
         *(sys.executable, "-m", "pytest", "-p", "tests.tools.suite.steady", OPTION, str(words.times)),
-        *("-n", str(WORKERS), "-m", "real_clock and not soak and not hardware", *words.paths),
+        *("-n", str(workers), "-m", "real_clock and not soak and not hardware", *words.paths),
     ]
     with ExitStack() as held:
-        for _ in range(max(words.load - WORKERS + 1, 0)):
+        for _ in range(words.load - workers + 1):
             busy = held.enter_context(subprocess.Popen([sys.executable, "-c", BUSY]))
             held.callback(busy.kill)
         load = held.enter_context(Load())
-        done = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True)
-        assert done.stdout is not None
-        said = []
-        for line in done.stdout:
-            said.append(line)
-            sys.stdout.write(line)
-            sys.stdout.flush()
-        code = done.wait()
-    failed = Counter(each[1] for each in FAILED.finditer("".join(said)))
+        code = subprocess.run(command, cwd=ROOT, check=False).returncode
     sys.stdout.write(f"load {load.mean:.1f}\n")
-    for name, count in failed.most_common():
-        sys.stdout.write(f"{name}: failed {count} of {words.times}\n")
     return code
 
 

@@ -181,8 +181,8 @@ def test_a_data_file_that_is_left_out_of_a_wheel_is_named(tmp_path: Path) -> Non
     assert left_out("p2os", wheel) == ["p2os/capture/p2os.lua"]
 
 
-#: Tests of the emulator that take little.
-OF_THE_EMULATOR = ("image",)
+#: Tests of the emulator that take little: of images, of code that is not run, of variables.
+OF_THE_EMULATOR = ("alterations", "image", "static_code", "variables")
 
 
 def shortest_tests(place: Path, *names: str) -> Path:
