@@ -310,3 +310,7 @@ def test_what_a_library_in_c_raises_after_a_refusal_to_its_callback_says_no_more
     offer(act)
     assert cli.run(["act"]) == code
     assert capsys.readouterr().err.splitlines()[-1].startswith(last)
+    assert cli.run(["act"], trace=True) == code
+    shown = capsys.readouterr().err.splitlines()
+    assert "Traceback (most recent call last):" in shown
+    assert any(line.endswith(f"{type(follows).__name__}: {follows}") for line in shown)

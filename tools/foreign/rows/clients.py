@@ -12,7 +12,7 @@ ARIA = Source(
 PLAYER = Source(
     folder="player", url="https://github.com/playerproject/player", commit="cb1e0b1349735bcad64eba8846b422f2dc59b768"
 )
-SOAR = Source(folder="py", url="https://pypi.org/project/Soar", commit="1.5.2")
+SOAR = Source(folder="py", url="https://snakes-on-a-robot.readthedocs.io", commit="1.5.2")
 ARDUINO = Source(
     folder="p2os-arduino", url="https://github.com/qemu-gazebo-sim/p2os-arduino",
     commit="b350bd5ec3b88cb85b62815d57b6f04aee39b57b",
