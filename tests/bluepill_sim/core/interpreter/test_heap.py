@@ -6,14 +6,19 @@ what is lost each time adds up.
 
 import ctypes
 import gc
+import json
+import subprocess
 from collections import deque
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
 from bluepill_sim.analysis.edge_log import EdgeLog
 from bluepill_sim.extension.library import core_chosen
 from tests.bluepill_sim.machine import COUNTER_ON, PORT_A_OUT, Machine, listen
+from tests.tools.forked_python import forked_python
+from tests.whole.failing_calls import Kind, Outcome, library, page_in
 
 LIBC = ctypes.CDLL(None) if hasattr(ctypes.CDLL(None), "mallinfo2") else None
 #: The smallest piece of a heap takes 32 bytes; seven that were given back before may still count as in use.
@@ -41,6 +46,23 @@ wait: ldr r0, [r1, #4]
 .half 0x4298
 bcc wait
 b again
+"""
+#: Runs code in SRAM three times, and once more when it has been written over, with one allocation of our C refused: the
+#: first, the second, and so on up to one that it never comes to. Prints what happened, and R0, of each run.
+REFUSED = """
+import ctypes, json, sys
+from tests.bluepill_sim.core.interpreter.test_blocks_decode import ADD_ONE, BKPT, NOP, SRAM, Board, InterpreterCore
+page, (kinds, kind, outcome, most) = sys.argv[1], map(int, sys.argv[2:])
+calls = ctypes.CDLL(None)
+for number in range(1, most + 1):
+    board = Board(InterpreterCore)
+    board.put(SRAM, ADD_ONE, NOP, ADD_ONE, BKPT)
+    with open(page, "r+b") as counts:
+        counts.write(bytes(8 * kinds))
+    calls.failing_calls_arm(page.encode(), kind, ctypes.c_long(number), outcome)
+    seen = [board.run(SRAM) for _ in range(3)]
+    board.put(SRAM, ADD_ONE, ADD_ONE, ADD_ONE, BKPT, drops=False)
+    print(json.dumps([*seen, board.run(SRAM)]))
 """
 
 pytestmark = pytest.mark.skipif(LIBC is None, reason="no glibc, which says how much of the heap is in use")
@@ -120,3 +142,22 @@ def test_recording_anew_takes_no_more_memory(core: str) -> None:
         pins.close()
 
     assert not grows(again)
+
+
+def test_without_memory_code_in_sram_runs_as_ever_or_a_fetch_fails(
+    tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    """What no memory was for is asked for again at the next run; code that could not be copied is decoded anew."""
+    allocations = 6
+    words = [*map(str, (page_in(tmp_path), len(Kind), int(Kind.MALLOC), int(Outcome.FAIL), allocations + 1))]
+    done = subprocess.run(
+        [forked_python(library(tmp_path_factory)), "-c", REFUSED, *words],
+        capture_output=True, text=True, check=False, timeout=60,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (0, "")
+    runs = [json.loads(line) for line in done.stdout.splitlines()]
+    failed = [[number for number, (_, ((what, *_), *_)) in enumerate(each) if what == "failed"] for each in runs]
+    assert failed == [[0], [0], [], [3], [3], [], []]
+    for each, without in zip(runs, failed, strict=True):
+        results = [result for result, _ in each]
+        assert results == [0 if number in without else expected for number, expected in enumerate((2, 2, 2, 3))]
