@@ -80,7 +80,7 @@ VERBS = (
     ("compare c c --tum t", 300),
     ("metrics c --picture m.png", 3000),
     ("sensitivity a.toml --vary threshold_m=0.3..0.6 --steps 2 --trajectories 0 --picture s.png", 3000),
-    ("validate sensors --out v", 300),
+    ("validate sensors --mode direct --body kinematic --out v", 300),
     (f"mcu run {MOTORS} --for 30ms --uart u.txt", 0),
     (f"mcu run {MOTORS} --for 30ms --itm i.txt --swo s.bin --uart u.txt", 0),
     (f"mcu run {MOTORS} --for 30ms --attach ssd1306,on=I2C1 --parts shots", 300),
