@@ -36,6 +36,12 @@ _HINTS = {
     errno.ENFILE: _MORE_FILES,
     errno.EIO: "is the disk sound, and the terminal still there?",
 }
+#: What was refused where it need not be a write, and of what.
+_REFUSED = {
+    errno.EMFILE: ("open", "a file"),
+    errno.ENFILE: ("open", "a file"),
+    errno.EIO: ("read or write", "a file or standard output"),
+}
 _IS_IT = "is this the file that you mean?"
 
 
@@ -315,6 +321,14 @@ def refuse_elsewhere(folder: Path, name: str, error: Callable[..., P2osError] = 
 def reason_of(error: OSError) -> str:
     """Return why the system refused something, in its own words."""
     return (error.strerror or str(error)).lower()
+
+
+def refusal_of(error: BaseException) -> str | None:
+    """Return what the system refuses for want of room or of a right, and why, in one line; None: it is not that."""
+    if not isinstance(error, OSError) or error.errno not in REFUSALS:
+        return None
+    what, where = _REFUSED.get(error.errno, ("write", "standard output"))
+    return f"cannot {what} {where if error.filename is None else error.filename}: {reason_of(error)}"
 
 
 def hint_of(error: OSError) -> str | None:

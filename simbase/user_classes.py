@@ -18,6 +18,7 @@ from typing import Any, cast
 
 from simbase.entry_points import installed_points
 from simbase.errors import P2osError, UsageError, shown, shown_name
+from simbase.files import refusal_of
 from simbase.trust.code import Code, is_in_file
 from simbase.trust.decision import UntrustedError
 from simbase.trust.fingerprint import fingerprint_of
@@ -133,8 +134,11 @@ def said(error: Exception) -> str:
 def unforeseen(error: BaseException) -> str:
     """Return an unforeseen exception as words: where in a file of the user it arose, or that it is a bug.
 
-    A want of memory is neither: the words are the error's own, as NumPy's, or that there was not enough.
+    What the system refuses is neither: the words are those of `refusal_of`. Nor is a want of memory: they are the
+    error's own, as NumPy's, or that there was not enough.
     """
+    if (refused := refusal_of(error)) is not None:
+        return refused
     if isinstance(error, MemoryError):
         return str(error) or "there is not enough memory"
     place, step = "", error.__traceback__

@@ -6,7 +6,6 @@ Exit codes: 0 done, 1 the operation failed, 2 wrong usage, 130 interrupted, by w
 
 import contextlib
 import difflib
-import errno
 import gc
 import os
 import sys
@@ -18,7 +17,7 @@ import typer
 
 from simbase.command_line.refused_connections import shown_refusals
 from simbase.command_line.signals import end_on_signals, ignore_signals, restored_signals
-from simbase.files import REFUSALS, hint_of, open_to_write, open_to_write_text, reason_of
+from simbase.files import hint_of, open_to_write, open_to_write_text
 from simbase.user_classes import unforeseen
 
 EXIT_FAILED = 1
@@ -31,13 +30,6 @@ NOWHERE = Path(os.devnull)
 COLLECTED_AFTER = 20_000
 
 MAKE_MEMORY = "end other programs, or ask for less at a time"
-
-#: What was refused where it need not be a write, and of what.
-_REFUSED = {
-    errno.EMFILE: ("open", "a file"),
-    errno.ENFILE: ("open", "a file"),
-    errno.EIO: ("read or write", "a file or standard output"),
-}
 
 #: Makes the application that words are for.
 Maker = Callable[[Sequence[str]], typer.Typer]
@@ -101,11 +93,9 @@ def report(program: str, error: Exception, *, trace: bool = False, follows: bool
     if trace:
         traceback.print_exception(error)
     code = getattr(error, "exit_code", None)
-    if isinstance(error, OSError) and error.errno in REFUSALS:  # of a file that is named, an error of ours tells
-        what, where = _REFUSED.get(error.errno, ("write", "standard output"))
-        where = where if error.filename is None else str(error.filename)
-        _print_error(f"{program}: {_one_line(f'cannot {what} {where}: {reason_of(error)}')}")
-        _print_error(f"hint: {hint_of(error)}")
+    if isinstance(error, OSError) and (hint := hint_of(error)) is not None:
+        _print_error(f"{program}: {_one_line(unforeseen(error))}")
+        _print_error(f"hint: {hint}")
         return EXIT_FAILED
     if (memory := _without_memory(error)) is not None:
         _print_error(f"{program}: {_one_line(unforeseen(memory))}")
@@ -142,7 +132,7 @@ def _in_a_line(program: str) -> Iterator[list[BaseException]]:
 
     def show(unraisable: "sys.UnraisableHookArgs") -> None:
         error = unraisable.exc_value
-        if isinstance(error, MemoryError) or (isinstance(error, OSError) and error.errno in REFUSALS):
+        if isinstance(error, MemoryError) or (isinstance(error, OSError) and hint_of(error) is not None):
             report(program, error)
             shown.append(error)
         else:

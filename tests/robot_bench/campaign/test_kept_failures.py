@@ -1,5 +1,6 @@
 """`p2os shrink`: the folder that it leaves runs, fails and explains itself; and what cannot be shrunk."""
 
+import errno
 import json
 import subprocess
 from importlib.metadata import EntryPoint
@@ -10,11 +11,14 @@ import pytest
 from p2os.cli import main as cli
 from robot_bench.campaign.trial import run_trial, trial_of
 from robot_bench.campaign.variants.shrinking.failure import FailureMode
+from robot_bench.campaign.variants.shrinking.kept import keep, trial_of_run
 from robot_bench.campaign.variants.shrinking.kept import test_text as text_of_test
-from robot_bench.campaign.variants.shrinking.kept import trial_of_run
+from robot_bench.recording.run_folder import TRACE_NAME
 from robot_bench.report.make import Files
 from robot_bench.run import run_scenario
 from robot_bench.scenario.loading import load_scenario
+from simbase.errors import FileError, P2osError
+from simbase.files import MAKE_ROOM
 from tests.robot_bench.firmware.hurried import hurried
 from tests.tools.forked_python import PYTEST, forked_p2os, forked_python
 
@@ -128,3 +132,41 @@ def test_the_test_of_a_fault_asks_whether_the_program_died() -> None:
     assert "assert not bench.chip.has_died" in text
     assert 'bench.run_until("2.5 s")' in text
     assert "judge" not in text
+
+
+@pytest.mark.parametrize(
+    ("refused", "says", "hint"),
+    [
+        (PermissionError(errno.EACCES, "Permission denied"), "permission denied", "name a place that you may write to"),
+        (OSError(errno.ENOSPC, "No space left on device"), "no space left on device", MAKE_ROOM),
+    ],
+)
+def test_a_file_of_a_kept_failure_that_cannot_be_written_is_named_with_a_hint(
+    refused: OSError, says: str, hint: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Found as the N-th call of `shrink` failed: its line had the number of the error, and no hint."""
+    trial, way = trial_of("dodge"), FailureMode(what="touches nothing")
+
+    def refuse(*_: object) -> None:
+        raise refused
+
+    monkeypatch.setattr("robot_bench.campaign.variants.shrinking.kept._COMMAND", ("true",))
+    monkeypatch.setattr("robot_bench.campaign.variants.shrinking.kept.read_run", lambda _: None)
+    monkeypatch.setattr("robot_bench.campaign.variants.shrinking.kept.make_scene", refuse)
+    Path("small/run").mkdir(parents=True)
+    Path("small/run", TRACE_NAME).touch()
+    with pytest.raises(FileError) as failed:
+        keep(trial, way, Path("small"))
+    assert (str(failed.value), failed.value.hint) == (f"cannot write small/scene.png: {says}", hint)
+    Path("small/test_dodge.py").unlink()
+    Path("small/test_dodge.py").mkdir()
+    with pytest.raises(FileError, match=r"cannot write small/test_dodge\.py: is a directory"):
+        keep(trial, way, Path("small"))
+
+
+def test_a_run_of_a_kept_failure_that_cannot_be_begun_is_a_failure(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("robot_bench.campaign.variants.shrinking.kept._COMMAND", ("./nothing",))
+    with pytest.raises(P2osError) as failed:
+        keep(trial_of("dodge"), FailureMode(what="touches nothing"), Path("small"))
+    assert str(failed.value) == "cannot run small/dodge.toml: [Errno 2] No such file or directory: './nothing'"
+    assert failed.value.hint == "end other programs"

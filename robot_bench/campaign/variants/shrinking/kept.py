@@ -30,7 +30,8 @@ from robot_bench.recording.run_folder import TRACE_NAME
 from robot_bench.recording.run_record import RunRecord, read_run
 from robot_bench.report import make_scene
 from robot_bench.report.explain.explain import explain
-from simbase.errors import FileError, P2osError, UsageError
+from simbase.errors import P2osError, UsageError, shown_name
+from simbase.files import write_text, writing
 from simbase.trust import Trust
 
 #: The folder of the run within.
@@ -63,28 +64,29 @@ def keep(trial: Trial, way: FailureMode, folder: Path) -> Kept:
 
     Raises:
         FileError: The folder cannot be written.
-        P2osError: The run cannot be read, or explained.
+        P2osError: The other process cannot be begun, or its run cannot be read, or explained.
     """
     scenario = trial.write(folder)
     trust = ["--trust"] if trial.trusted else []
     test = folder / f"test_{_identifier(trial.name)}.py"
+    write_text(test, test_text(trial, way))
     try:
-        test.write_text(test_text(trial, way), encoding="utf-8")
         found = subprocess.run(  # noqa: S603 - this interpreter, with files of our own
             [*_COMMAND, "run", scenario, *trust, "--out", folder / RUN_NAME, "--force", "--json"],
             capture_output=True, text=True, timeout=_MOST_S, check=False,
         )  # fmt: skip
         there = json.loads(found.stdout) if found.stdout.startswith("{") else {}
-        record = None
-        if (folder / RUN_NAME / TRACE_NAME).is_file():  # several robots have one each
-            record = read_run(folder / RUN_NAME)
-            make_scene(record, folder / "scene.png")
     except (OSError, ValueError) as error:
-        raise FileError(f"cannot keep {scenario}: {error}") from error
+        raise P2osError(f"cannot run {shown_name(scenario)}: {error}", hint="end other programs") from error
+    record = None
+    if (folder / RUN_NAME / TRACE_NAME).is_file():  # several robots have one each
+        record, scene = read_run(folder / RUN_NAME), folder / "scene.png"
+        with writing(scene):
+            make_scene(record, scene)
     here = run_trial(trial)
     explained = "" if record is None else _explained(record, folder / trial.firmware_name)
     if explained:
-        (folder / "explained.txt").write_text(f"{explained}\n", encoding="utf-8")
+        write_text(folder / "explained.txt", f"{explained}\n")
     hashes = there.get("trace_sha256") or there.get("sha256")
     is_same = hashes == here.sha256 or "robots" in there  # several robots have a hash each, there
     return Kept(
