@@ -162,7 +162,10 @@ def test_a_table_that_differs_from_kicad_s_library_is_named(tmp_path: Path) -> N
         target.write_text(f"(footprint {pads})", encoding="utf-8")
     assert lands.kicad_differences(tmp_path) == []
     chip = tmp_path / "Resistor_SMD.pretty" / "R_0805_2012Metric.kicad_mod"
-    chip.write_text(chip.read_text(encoding="utf-8").replace("1.025", "1.1"), encoding="utf-8")
+    drawn = chip.read_text(encoding="utf-8")
+    chip.write_text(drawn.replace("1.025", "1.0254"), encoding="utf-8")
+    assert lands.kicad_differences(tmp_path) == []
+    chip.write_text(drawn.replace("1.025", "1.026"), encoding="utf-8")
     (line,) = lands.kicad_differences(tmp_path)
     assert line.startswith("R_0805: ")
 

@@ -185,7 +185,7 @@ def kicad_differences(library: Path) -> list[str]:
             at, size, drill = children(pad, "at")[0], children(pad, "size")[0], children(pad, "drill")
             theirs.append([named.get(word(pad), word(pad)), float(word(at)), float(word(at, 2)), float(word(size)),
                            float(word(size, 2)), float(word(drill[0])) if drill else 0.0])  # fmt: skip
-        if sorted(map(list, row["pads"]), key=str) != sorted(theirs, key=str) and not _rows_equal(row["pads"], theirs):
+        if not _rows_equal(row["pads"], theirs):
             found.append(f"{name}: {row['pads']}, KiCad's {row['kicad']} has {theirs}")
     return found
 
