@@ -133,10 +133,6 @@ class Span:
             found = self.low + at * (self.high - self.low)
         return round(found) if self.is_whole else round(found, 4)
 
-    def place(self, share: float) -> float:
-        """Return a place of the unit interval that comes to the value at a share of the range, for grids."""
-        return min(max(share, 0.0), 1 - 1e-9)
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drawn:

@@ -20,7 +20,7 @@ from pyarrow import parquet
 from p2os.pioneer.world import load_world
 from robot_bench.campaign import things
 from robot_bench.campaign import whole as whole_module
-from robot_bench.campaign.campaign_file import CampaignTable, RunLimits, campaign_schema, parse_campaign
+from robot_bench.campaign.campaign_file import CampaignTable, RunLimits, Span, campaign_schema, parse_campaign
 from robot_bench.campaign.conduct import CampaignProgress
 from robot_bench.campaign.last_moment import LastMoment
 from robot_bench.campaign.margin import goal_margin, margin
@@ -107,6 +107,45 @@ share = 0.5
 text = "CRUISE"
 [[reach]]
 text = "never"
+"""
+#: What can be drawn and disturbed: seen from the robot, in an area, in swarms; and rows in place of `HERE`.
+SPACE = """
+scenario = "mine.toml"
+swarm = {swarm}
+keeps = ["no_collision"]
+{top}
+[vary]
+start.heading_deg = {{ from = 0, to = 350, step = 10 }}
+start.x_m = [0.4, 0.5]
+{vary}
+[[draw]]
+kind = "post"
+name = "near"
+count = {{ from = 0, to = 2 }}
+ahead_m = {{ from = 0.8, to = 2.0 }}
+{draw}
+[[draw]]
+kind = "wall"
+count = [1, 3]
+area_m = [-2, -1.5, 2, 1.5]
+gap_m = 0.1
+length_m = 0.7
+{area}
+[[disturb]]
+fault = "sonar-dead {{sonar}}"
+sonar = {{ from = 1, to = 8 }}
+at_s = {{ from = 1, to = 3 }}
+share = 0.5
+[[disturb]]
+fault = "sonar-dead 2"
+name = "second"
+[[goal]]
+kind = "no_collision"
+excused_by = ["near", "second"]
+[[goal]]
+kind = "min_distance"
+distance_m = 0.1
+{goal}
 """
 HASH = re.compile(r"\b[0-9a-f]{12,64}\b")
 
@@ -318,6 +357,59 @@ def files(_draw: Random) -> Iterator[str]:
     yield said(CampaignTable)
 
 
+def spaces(draw: Random) -> Iterator[str]:
+    """Go through spaces of drawn things and faults, and refuse tables that cannot be meant."""
+    rows: tuple[dict[str, object], ...] = (
+        {}, {"swarm": 0.4}, {"draw": "aside_m = { from = -0.5, to = 0.5 }"}, {"draw": "heading_deg = 30"},
+        {"draw": "area_m = [0, 0, 1, 1]"}, {"area": "aside_m = 1"}, {"area": 'name = "near"'},
+        {"draw": "radius_m = { from = 0.1, to = 0.2 }"}, {"draw": "length_m = 1.0"}, {"draw": "gap_m = 0.2"},
+        {"draw": "width_m = { from = 0.3, to = 0.2 }"}, {"draw": "width_m = [[1]]"}, {"draw": "width_m = true"},
+        {"draw": "ahead = 1"}, {"area": "width_m = [0.1, 0.2]"}, {"goal": 'excused_by = ["nears"]'},
+        {"top": '[cheap]\nmode = "direct"'}, {"top": '[cheap]\nbody = "odd"'}, {"top": "[full]\nworld = 3"},
+        {"top": "[full.start]\nz_m = 3"}, {"vary": "start.z_m = [1]"}, {"vary": 'world = ["room", "arena"]'},
+        {"vary": 'duration_s = { from = 2, to = 9, tail = "long" }'}, {"vary": "seed = { from = 1, to = 5, step = 2 }"},
+        {"vary": 'duration_s = { from = 0, to = 9, tail = "long" }'}, {"vary": "seed = { from = 3, to = 3 }"},
+    )  # fmt: skip
+    with TemporaryDirectory(prefix="p2os-test-") as name:
+        file = Path(name, "camp.toml")
+        (Path(name) / "mine.toml").write_text(SCENARIO, encoding="utf-8")
+        empty = {"swarm": 0, "top": "", "vary": "", "draw": "", "area": "", "goal": ""}
+        texts = [(said(row), SPACE.format(**{**empty, **row})) for row in rows]
+        texts += [
+            (area, SPACE.format(**empty).replace("[-2, -1.5, 2, 1.5]", area))
+            for area in ("[-2, -1.5, 2]", "[2, -1.5, 2, 1.5]", "[-2, 1.5, 2, 1.5]", '["a", 0, 1, 1]', "[0, 0, 1, 1]")
+        ]
+        head = 'scenario = "mine.toml"\n'
+        texts += [
+            (rest, head + rest)
+            for rest in (
+                "", '[[draw]]\nkind = "post"', "[vary]\nseed = [1]", 'keeps = ["reach"]', 'firmware = "gone.elf"',
+                '[[disturb]]\nfault = "sonar-dead 1"\nat_s = 2',
+            )
+        ]  # fmt: skip
+        for label, text in texts:
+            try:
+                found = parse_campaign(text, file, firmware=None)
+            except P2osError as error:
+                yield f"{label}: {error} ({error.hint})".replace(name, "HERE")
+                continue
+            yield said([label, found.draws, found.disturbances, found.vary, found.cheap, found.full, found.trial.table])
+            space = Space(found)
+            yield said([(one.name, one.span, one.span.count) for one in space.dimensions])
+            for _ in range(4):
+                proposal = space.proposal(tuple(draw.random() for _ in space.dimensions))
+                yield said([proposal.values, proposal.settings, proposal.obstacles, proposal.faults])
+                yield said([sorted(space.acting(proposal)), sorted(proposal.disturbed_by)])
+            trial = proposal.trial(found.trial, found.cheap)
+            yield said([[(key, trial.table.get(key)) for key in ("start", "body", "obstacle", "fault", "goal")],
+                        sorted(trial.disturbed_by), space.coordinates(proposal.point)])  # fmt: skip
+    for span in (
+        Span(1, 9, 2, is_whole=True), Span(0, 1), Span(0.5, 2.0, 0.5), Span(60, 900, is_long_tailed=True),
+        Span(1, 4, 1, is_whole=True, is_long_tailed=True), Span(choices=("a", "b", "c")), Span(2.0, 2.0),
+    ):  # fmt: skip
+        yield said([span, span.count, [span.value(at) for at in (0.0, 0.1, 0.33333, 0.5, 0.66667, 0.999999, 1.0)]])
+
+
 def packed(_draw: Random) -> Iterator[str]:
     """Pack scenarios with the files that they name: worlds that stand alone and that import, programs, own robots."""
     with TemporaryDirectory(prefix="p2os-test-") as name:
@@ -445,7 +537,7 @@ def drawn_things(draw: Random) -> Iterator[str]:
 
 
 TRACES: dict[str, Trace] = {
-    "files": files, "packed": packed, "limited": limited, "figures": figures, "things": drawn_things,
+    "files": files, "spaces": spaces, "packed": packed, "limited": limited, "figures": figures, "things": drawn_things,
     "seen": seen_so_far,
 }  # fmt: skip
 for _package in ("campaign", "campaign.reaching", "campaign.workers", "campaign.pages"):

@@ -1,5 +1,8 @@
 """Trials made small, compared by versions, mutated and mended, by answers that are made up: each question and word."""
 
+import itertools
+import re
+import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -19,9 +22,9 @@ from robot_bench.campaign.last_moment import LastMoment, last_moment
 from robot_bench.campaign.trial import GoalResult, HullContact, Outcome, Trial, TrialVerdict, run_trial, trial_of
 from robot_bench.campaign.variants import against, changed_back, diversity, fault_line
 from robot_bench.campaign.variants.against import Against, Other, compared
-from robot_bench.campaign.variants.mutation import report
+from robot_bench.campaign.variants.mutation import base_run, report, suite
 from robot_bench.campaign.variants.mutation.interval import share_interval
-from robot_bench.campaign.variants.mutation.trial import Fate, MostCost, MutantResult
+from robot_bench.campaign.variants.mutation.trial import Fate, MostCost, MutantResult, try_mutant
 from robot_bench.campaign.variants.shrinking import kept
 from robot_bench.campaign.variants.shrinking.failure import Failure, FailureMode, failure_of
 from robot_bench.campaign.variants.shrinking.reduction import ANGLE_STEPS, STEPS, fewest, rounded, rounder
@@ -34,7 +37,7 @@ from robot_bench.campaign.variants.shrinking.things import (
     with_world,
     world_table,
 )
-from robot_bench.scenario.loading import shipped_file
+from robot_bench.scenario.loading import load_scenario, shipped_file
 from simbase.errors import P2osError
 from tests.robot_bench.firmware.hurried import hurried
 from tests.tools.suite.approved import Trace, judge_of, refusal, said, tried
@@ -313,8 +316,129 @@ def mutation(draw: Random) -> Iterator[str]:
             yield looked.result.text
 
 
+class Answering:
+    """Takes the place of `pytest.main`: looks at a test with a bench and one without, and ends with a code."""
+
+    def __init__(self, code: int, failing: Sequence[str], board: Any) -> None:
+        self.words: list[str] = []
+        self.content = b""
+        self._code, self._failing, self._board = code, failing, board
+
+    def __call__(self, words: Sequence[str], plugins: Sequence[Any]) -> int:
+        sys.stdout.write("nobody reads this")
+        self.words, bench = [*words], SimpleNamespace(
+            trace=SimpleNamespace(sha256="abc"), robots={"": SimpleNamespace(chip=self._board),
+                                                         "port": SimpleNamespace(chip=3)})  # fmt: skip
+        firmware = Path(next(word for word in words if "firmware" in word).partition("=")[2])
+        self.content = firmware.read_bytes()[:12] if firmware.exists() else b""
+        for item in (SimpleNamespace(funcargs={"bench": bench}), SimpleNamespace(funcargs={}), SimpleNamespace()):
+            plugins[0].pytest_runtest_teardown(item)
+        for name in ("a/test_a.py::one", *self._failing, "a/test_b.py::last"):
+            plugins[0].pytest_runtest_logreport(SimpleNamespace(failed=name in self._failing, nodeid=name))
+        return self._code
+
+
+def suites(_draw: Random) -> Iterator[str]:
+    """Try mutants by tests whose ends are made up: what pytest is asked, by which limits, and what that comes to."""
+    firmware = shipped_file("dodge").parent.parent / "firmware" / "dodge.elf"
+    board, limits = BluePill(firmware), list[object]()
+    board.run_for(20_000)
+    for code, failing in ((0, ()), (1, ()), (1, ("a/b/test_c.py::two", "a/test_d.py::three")), (2, ()), (5, ())):
+        main = Answering(code, failing, board)
+        with mock.patch("pytest.main", main):
+            found = suite.run_suite([Path("tests"), Path("more.py")], Path("a.elf"))
+            yield said([main.words, found.to_plain(), suite.SuiteRun.from_plain(found.to_plain()) == found])
+            for data, other in ((firmware.read_bytes(), "abc"), (b"plain" * 9000, found.sha256)):
+                judge = suite.Suite(paths=(Path("t"),), base=suite.SuiteRun(sha256=other), data=data, image=board.image)
+                with (
+                    mock.patch.object(suite.resource, "setrlimit", lambda *given: limits.append(given[1])),
+                    mock.patch.object(suite, "mutated_file", lambda data, mutant, _image: data[:4] + mutant),
+                ):
+                    yield said([judge.try_mutant(b"mutant", 7), limits])
+                yield said(
+                    [main.content, *(re.sub(r"=.*/p2os-mutant-[^/]*", "=HERE", word) for word in main.words[-2:])]
+                )
+                limits.clear()
+
+
+def fault_lines(draw: Random) -> Iterator[str]:
+    """Name the line by which versions differ, and choose trials of campaigns, whose runs are made up."""
+    with TemporaryDirectory(prefix="p2os-test-") as name:
+        mine = trial(Path(name))
+    good = Other("good.elf", b"else")
+    one_line = LineDifference("f", (("a.c", 3),), (("a.c", 3),))
+    lacking = LineDifference("g", (("a.c", 7), ("a.c", 9)), ())
+    far = LineDifference("h", (), (("b.c", 40), ("b.c", 44)))
+    for number in range(24):
+        ours = draw.choice((TrialVerdict.FAILED, TrialVerdict.FAILED, TrialVerdict.FAILED, TrialVerdict.PASSED))
+        theirs = [draw.choice((TrialVerdict.PASSED, TrialVerdict.FAILED, TrialVerdict.ERROR)) for _ in range(2)]
+        rows = draw.choice(([], [one_line], [replace(one_line, is_number=True)], [one_line, far], [lacking, far],
+                            [replace(one_line, is_number=True), one_line]))  # fmt: skip
+        apart = draw.choice((None, "parted"))
+        asked: list[str] = []
+
+        def ran(given: Trial, theirs: Any = theirs, ours: Any = ours, asked: list[str] = asked) -> Outcome:
+            is_good = given.files[given.firmware_name] == b"else"
+            asked.append(f"{given.seed}{'+' if is_good else '-'}")
+            failures = () if theirs[given.seed] is TrialVerdict.ERROR and is_good else ("it hit", "more")
+            return Outcome(verdict=theirs[given.seed] if is_good else ours, failures=failures)
+
+        with (
+            mock.patch.object(fault_line, "run_trial", ran),
+            mock.patch.object(fault_line, "first_apart", return_value=apart),
+            mock.patch.object(fault_line, "line_differences", return_value=rows),
+            mock.patch.object(fault_line, "reported", "they part: {}".format),
+            mock.patch.object(fault_line, "image_of", lambda given: given.files[given.firmware_name]),
+        ):  # fmt: skip
+            trials = [replace(mine, seed=seed) for seed in range(2)]
+            found = tried(fault_line.by_version, trials, good)
+            yield said([number, ours, theirs, apart, len(rows), found, asked])
+        yield from fault_line.FaultLine(
+            line="a.c:3" * (number % 2), says="word " * 40, also=("x", "y " * 90)
+        ).text.split("\n")
+    goals = [{"kind": "reach"}, {"kind": "no_collision", "excused_by": ["post"]}, {"kind": "x", "excused_by": ["wall"]}]
+    for by in ((), ("post",), ("post", "wall")):
+        given = replace(mine.with_lists(goal=goals), disturbed_by=frozenset(by))
+        yield said(changed_back._ends_when_missed(given).table["goal"])
+    for verdict in TrialVerdict:
+        workers: Any = SimpleNamespace(run=lambda trials, on_done, verdict=verdict: [
+            on_done(place, (Outcome(verdict=verdict), 1.0)) for place, _ in enumerate(trials)])  # fmt: skip
+        yield said([verdict, changed_back.passes(mine, workers)])
+    for count in (0, 3, 90):
+        rows_of: list[Any] = [
+            SimpleNamespace(cheap=SimpleNamespace(trial=replace(mine, seed=number), outcome=outcome(draw)))
+            for number in range(count)
+        ]
+        yield tried(
+            lambda rows_of=rows_of: [[one.seed for one in part] for part in changed_back.failing_and_passing(rows_of)]
+        )
+
+
+def tries(draw: Random) -> Iterator[str]:
+    """Run a program, then with one instruction changed at a time: what each does to what scenarios notice."""
+    with TemporaryDirectory(prefix="p2os-test-") as name:
+        clock, looks = itertools.count(0, 1000), list[int]()
+        one = trial(Path(name), duration=0.4)
+        calm = one.with_lists(obstacle=[])
+        plans = [each.scenario(Path(name)) for each in (one.with_lists(goal=[]), one, calm)]
+        for plan in (plans[0], replace(plans[1], robots=load_scenario("two-dodge").robots), plans[1]):
+            yield tried(base_run.base_run, plan, lambda: next(clock), lambda: looks.append(1)).partition("BaseRun")[0]
+        base = base_run.base_run(plans[2], lambda: next(clock), lambda: looks.append(1))
+        yield said([len(looks), base.bench.now, base.ran_ns, base.cost_ns, len(base.first_ns), sorted(base.states)])
+        unsound = base_run.base_run(plans[1], lambda: next(clock), lambda: None, is_sound=False)
+        yield said([unsound.bench.now, unsound.ran_ns, len(unsound.states), unsound.trace_sha256 == base.trace_sha256])
+        every = mutants(base.board.image, sorted(base.first_ns))
+        for number, one_change in enumerate([*draw.sample(every, 9), replace(every[0], address=3)]):
+            for most in (MostCost(), MostCost(2, 0))[: 1 + (number < 2)]:
+                found = try_mutant(one_change, [base], lambda: next(clock), lambda: looks.append(1), most)
+                yield said(
+                    [f"{one_change.address:x}", one_change.alteration.before, one_change.alteration.after, found]
+                )
+
+
 TRACES: dict[str, Trace] = {
     "lists": lists, "versions": versions, "mutation": mutation, "shrinking": shrinking, "outcomes": outcomes,
+    "suites": suites, "fault lines": fault_lines, "tries": tries,
     "declared": declared_of(*(f"robot_bench.campaign.{one}" for one in (
         "variants", "variants.mutation", "variants.shrinking"))),
 }  # fmt: skip
