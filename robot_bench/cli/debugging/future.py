@@ -430,7 +430,6 @@ class Future:
     def _stand(self, why: str, stop: HaltReason = _STEPPED) -> Halted:
         """Stand still where the chip is."""
         self.head_ns = self._stood_ns = self.now_ns
-        self._hits.clear()
         self.look_ahead()
         self._hits.clear()
         return Halted(0, why, stop)

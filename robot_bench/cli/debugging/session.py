@@ -394,8 +394,9 @@ class RunSession:
 
     def _drive_on(self) -> None:
         """Have the chosen future driven as somebody wants."""
-        if self._speeds not in {None, driven_by(self._chosen.hands, self._chosen.now_ns)}:
-            self._hand(RunCommand(do="hand", words=drive_words(self._speeds or (0.0, 0.0))))
+        speeds = self._speeds
+        if speeds is not None and speeds != driven_by(self._chosen.hands, self._chosen.now_ns):
+            self._hand(RunCommand(do="hand", words=drive_words(speeds)))
 
     def _save(self, command: RunCommand) -> None:
         self._saved = self._recorder.saved(self._chosen, saved_as(command.words))

@@ -45,8 +45,10 @@ def ramped(commands: Steps, times: Floats, faster: float, slower: float, reversa
         slower: Deceleration towards 0.
         reversal_s: How long it stands at 0 before it goes the other way.
     """
+    if not len(commands.t_s):
+        return np.zeros(len(times))
     at, speed, target = -np.inf, 0.0, 0.0
-    knots: list[tuple[float, float]] = [(min([*times[:1].tolist(), *commands.t_s[:1].tolist()]) - 1.0, 0.0)]
+    knots: list[tuple[float, float]] = []
     for start, value in [*zip(commands.t_s.tolist(), commands.values.tolist(), strict=True), (np.inf, 0.0)]:
         while speed != target:
             stop = 0.0 if speed * target < 0 else target  # where the sign changes it stands first

@@ -50,10 +50,9 @@ def sensor_figures(record: RunRecord, nominal: Nominal, scenario: Scenario) -> l
             if len(match) != 1:
                 wrong, where = wrong + 1, f"{wire} rose {len(match)} times for the thing at {begin / NS_PER_S:g} s"
                 continue
-            spans.remove(match[0])
-            for figures, name, late in (
-                (rises, "thing appears", match[0][0] - begin), (falls, "thing is gone", match[0][1] - end)
-            ):  # fmt: skip
+            rose, fell = span = match.pop()
+            spans.remove(span)
+            for figures, name, late in ((rises, "thing appears", rose - begin), (falls, "thing is gone", fell - end)):
                 figures.append(Figure(
                     group="pins", what=f"{name} to the distance pin", expected=0.0, measured=late / NS_PER_S,
                     uncertainty=1e-9, unit="s", bound=bound, at=f"{wire} at {begin / NS_PER_S:g} s",

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
+from types import SimpleNamespace
 from typing import Any
 from unittest import mock
 
@@ -21,10 +22,10 @@ from p2os.pioneer.world import load_world
 from robot_bench.campaign import things
 from robot_bench.campaign import whole as whole_module
 from robot_bench.campaign.campaign_file import CampaignTable, RunLimits, Span, campaign_schema, parse_campaign
-from robot_bench.campaign.conduct import CampaignProgress
+from robot_bench.campaign.conduct import CampaignProgress, PointFinding
 from robot_bench.campaign.last_moment import LastMoment
 from robot_bench.campaign.margin import goal_margin, margin
-from robot_bench.campaign.pages import page
+from robot_bench.campaign.pages import comment, page
 from robot_bench.campaign.pages.comment import _plain, write_comment
 from robot_bench.campaign.results import PointRate, Whole
 from robot_bench.campaign.search import Listed
@@ -32,12 +33,13 @@ from robot_bench.campaign.space import Space
 from robot_bench.campaign.suggestion import suggested
 from robot_bench.campaign.trial import GoalResult, HullContact, Outcome, SeenSoFar, Trial, TrialVerdict, trial_of
 from robot_bench.campaign.variants import diversity
+from robot_bench.campaign.variants.fault_line import FaultLine
 from robot_bench.campaign.whole import begin, carry_out, points_of, resume
 from robot_bench.campaign.workers import processes
 from robot_bench.cli.campaigns import campaign as verb
 from robot_bench.events.kinds import Contact, Note, Pose, Text
 from robot_bench.scenario.loading import load_scenario
-from simbase.errors import P2osError
+from simbase.errors import P2osError, UsageError
 from tests.robot_bench.campaign.test_campaign import Shuffled
 from tests.robot_bench.firmware import thumb
 from tests.tools.suite.approved import Trace, judge_of, rounded, said, tried
@@ -490,6 +492,23 @@ def figures(draw: Random) -> Iterator[str]:
     yield said([page._correlation([(1.0, 1.0), (1.0, 2.0)]), page._last(None)])
 
 
+def comments(_draw: Random) -> Iterator[str]:
+    """Say where a failing point parts from a good version, of points whose failing run is the cheap one or another."""
+    runs = {name: SimpleNamespace(trial=name) for name in ("cheap", "failing")}
+    for finding in PointFinding:
+        for failing in (None, runs["failing"]):
+            row: Any = SimpleNamespace(finding=finding, cheap=runs["cheap"], failing=failing)
+            for apart in (None, "apart"):
+                for cause in (FaultLine(line="a.c:3", says="so"), FaultLine(line="", says="why"), UsageError("no")):
+                    with (
+                        mock.patch.object(comment, "first_apart", return_value=apart) as asked,
+                        mock.patch.object(comment, "by_version", side_effect=[cause]) as by,
+                        mock.patch.object(comment, "reported", "reported {}".format),
+                    ):
+                        yield said([finding, failing is None, comment._against(row, "other")])  # type: ignore[arg-type]
+                        yield said([asked.call_args.args, by.call_args.args])
+
+
 def seen_so_far(draw: Random) -> Iterator[str]:
     """Take what runs show: places, contacts, lines with figures in them, and more of these than are kept."""
     for most in (3, 200, 230):
@@ -538,7 +557,7 @@ def drawn_things(draw: Random) -> Iterator[str]:
 
 TRACES: dict[str, Trace] = {
     "files": files, "spaces": spaces, "packed": packed, "limited": limited, "figures": figures, "things": drawn_things,
-    "seen": seen_so_far,
+    "seen": seen_so_far, "comments": comments,
 }  # fmt: skip
 for _package in ("campaign", "campaign.reaching", "campaign.workers", "campaign.pages"):
     TRACES[f"declared in {_package}"] = declared_of(f"robot_bench.{_package}")

@@ -14,10 +14,12 @@ from bluepill_sim.analysis.waveforms.alignment import Alignment, ChannelPair, Cl
 from bluepill_sim.analysis.waveforms.comparison import Jump, Miswired, PinComparison, Unexplained
 from p2os.cli.main import run as p2os
 from robot_bench.campaign.variants.fault_line import FaultLine
-from robot_bench.cli import compare_pins, explain
+from robot_bench.cli import compare_pins, explain, sweep
 from robot_bench.cli.experiments import compare, fit, metrics, validate
 from robot_bench.drives.latency_budget import STEPS, WHOLE, LatencyBudget
+from robot_bench.experiments import comparison_page
 from robot_bench.experiments.fitting.least_squares import Estimate, Fit
+from robot_bench.report import measures
 from robot_bench.report.explain.chain import Explanation, Standing
 from simbase.errors import FileError, UsageError
 from tests.robot_bench.cli.walks.printed import in_folder, printed
@@ -79,6 +81,7 @@ def measured(draw: Random) -> Iterator[str]:
         values = {name: draw.choice((None, 0.0, -0.123456, 98765.4321)) for name in metrics_names()}
         found: Any = SimpleNamespace(name=f"d{number}", goals=goals, latency=LatencyBudget(steps), **values)
         yield from metrics.lines_of(found)
+        yield said(measures._latency(found))
     with mock.patch("robot_bench.experiments.pictures.write_png", side_effect=ValueError("drawn")):
         yield tried(metrics._draw, found, Path("a.png"))
         found.latency = LatencyBudget()
@@ -277,6 +280,22 @@ def lines_of_campaigns() -> Iterator[str]:
                 yield said([tick_s, explain._line_of_campaign(Path("camp"), other, 1.0), calls])  # type: ignore[arg-type]
 
 
+def unequal(_draw: Random) -> Iterator[str]:
+    """Refuse results whose parts are not of one length, where no more is shown of them than their shorter one."""
+    rows = [SimpleNamespace(settings=()), SimpleNamespace(settings=(("a", 1),))]
+    for count in range(4):
+        outcomes: Any = [{"trace_sha256": f"{n}"} for n in range(count)]
+        yield tried(sweep._are_seeds_alike, SimpleNamespace(rows=rows, outcomes=outcomes)).partition(":")[0]
+    for ours, theirs in (((2, 2), (2, 2)), ((3, 2), (2, 2)), ((2, 2), (3, 2)), ((2, 3), (2, 2)), ((2, 2), (2, 3))):
+        shown: list[object] = []
+        ways = [SimpleNamespace(t_s=[0.0, 0.5], x_m=[1.0] * places, y_m=[2.0] * places, heading_rad=[0.25 * n] * turns)
+                for n, (places, turns) in enumerate((ours, theirs))]  # fmt: skip
+        compared: Any = SimpleNamespace(ours=ways[0], theirs=ways[1])
+        with mock.patch.object(comparison_page, "_samples", lambda *given, s=shown: s.append(said(given[1:]))):
+            ended = tried(comparison_page._add_differences, SimpleNamespace(), compared)
+        yield said([ours, theirs, ended.partition(":")[0], shown])
+
+
 def validated(_draw: Random) -> Iterator[str]:
     """Validate, by runs that are made up: what is printed, and how it ends."""
     for passed in (True, False):
@@ -297,6 +316,6 @@ def validated(_draw: Random) -> Iterator[str]:
 
 TRACES: dict[str, Trace] = {
     "pins": pins, "measured": measured, "compared": compared, "fitted": fitted, "explained": explained,
-    "explained campaigns": explained_campaigns,     "validated": validated,
+    "explained campaigns": explained_campaigns,     "validated": validated, "unequal": unequal,
 }  # fmt: skip
 test_each_line_of_what_came_is_what_was_approved = judge_of(__file__, TRACES)

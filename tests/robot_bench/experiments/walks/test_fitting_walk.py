@@ -1,17 +1,22 @@
 """What is fitted to drives: what least squares are asked, what they answer, and each model, at random."""
 
 import contextlib
+import zlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from pathlib import Path
 from random import Random
+from tempfile import TemporaryDirectory
 from typing import Any
 from unittest import mock
 
 import numpy as np
 
 from p2os.pioneer.world import load_world
+from p2os.pioneer.world.model import Pose
+from p2os.protocol.commands import rvel, vel
 from robot_bench.drives.drive import Drive, Floats, Steps, Trajectory, steps_of
-from robot_bench.experiments.fitting import clocks, ramps, sonar, umbmark, wheels
+from robot_bench.experiments.fitting import clocks, examples, ramps, sonar, umbmark, wheels
 from robot_bench.experiments.fitting.echoes import Bearings
 from robot_bench.experiments.fitting.least_squares import Estimate, Fit, Parameter, Rounding, fit
 from robot_bench.experiments.fitting.resampling import best_of_resamples, estimate_of
@@ -222,7 +227,39 @@ def shifted(draw: Random) -> Iterator[str]:
     yield said([clocks.without_delays(both, why).as_plain() for why in ("", "of another clock")])
 
 
+def example_drives(_draw: Random) -> Iterator[str]:
+    """Draw robots and the ways that they are driven, record short drives, and write all that an example has."""
+    for seed in range(6):
+        for noise in (True, False):
+            one = examples.planted(seed, noise=noise)
+            yield said([one.texts, one.parameters.track_mm, one.parameters.motion, one.parameters.sonar_cone_deg])
+            yield said([one.errors.odometry, one.errors.sonar])
+        stages = examples.wandering(seed, (60.0, 9.0, 0.0)[seed % 3])
+        yield said([(*[(command.number, command.argument) for command in said_], lasts) for said_, lasts in stages])
+    yield said([[examples._after(Pose(0.5, -1.0, at), speed, rate, 2.0) for speed, rate in ((0.3, 0.5), (-0.2, 1.5))]
+                for at in (0.0, 3.0)])  # fmt: skip
+    for stages in (examples.square(clockwise=True, side_mm=120)[:2], [((vel(200), rvel(30)), 0.7), ((vel(0),), 0.3)]):
+        for start, camera in ((None, True), (Pose(1.0, 0.5, 0.3), False)):
+            made = examples.record(one, examples.empty_world(), stages, seed=3, start=start, camera=camera)
+            yield said([(chunk.at_ns, chunk.direction, zlib.crc32(chunk.data)) for chunk in made.capture.chunks])
+            yield said(made.poses)
+    calls: list[object] = []
+
+    def recorded(robot: Any, world: Any, stages: Any, *, seed: int) -> Any:
+        calls.append(
+            [robot.texts == examples.planted(3).texts, world.name, len(stages), stages[1][0][0].argument, seed]
+        )
+        return replace(made, poses=made.poses[:2])
+
+    with TemporaryDirectory(prefix="p2os-test-") as name, mock.patch.object(examples, "record", recorded):
+        written = examples.write_examples(Path(name, "made"), load_world("room"), 3)
+        yield said([[path.name for path in written], sorted(path.name for path in Path(name, "made").iterdir()), calls])
+        for file in ("planted.toml", "planted-errors.toml", "drive-1.truth.csv"):
+            yield Path(name, "made", file).read_text(encoding="utf-8")
+
+
 TRACES: dict[str, Trace] = {
+    "examples": example_drives,
     "fits": fits, "ramped": ramped, "squares": squares, "echoes": echoes, "readings": readings, "shifted": shifted,
     "declared": declared_of("robot_bench.experiments.fitting"),
 }  # fmt: skip

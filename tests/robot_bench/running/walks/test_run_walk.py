@@ -309,6 +309,38 @@ def expectations(_draw: Random) -> Iterator[str]:
             yield tried(run_of(bench).refuse_the_ended)
 
 
+#: What is done to a bench while it runs, one after the other.
+DONE: Sequence[tuple[str, tuple[object, ...], dict[str, object]]] = (
+    ("place", ("post",), {"shape": "cylinder", "radius_m": 0.1, "height_m": 0.5, "x_m": 1.2, "y_m": 0.25}),
+    ("place", ("post",), {"shape": "cylinder", "radius_m": 0.1, "height_m": 0.5, "x_m": 1.5, "y_m": 0.25}),
+    ("place", ("pole",), {"shape": "cylinder", "radius_m": 0.1, "height_m": 0.5, "before_sonar": 4,
+                          "distance_m": 0.6, "hold_s": 0.03}),
+    ("place", ("odd",), {"shape": "cone"}), ("place", ("odd",), {"at_s": 3.0}),
+    ("move", ("post",), {"x_m": 1.3, "y_m": 0.3}), ("move", ("nothing",), {"x_m": 1.0, "y_m": 0.0}),
+    ("remove", ("post",), {}), ("remove", ("post",), {}),
+    ("inject", ("sonar-stuck 3 0.2",), {}), ("inject", ("sonar-stuck 4 0.3", "30 ms"), {}), ("inject", ("odd",), {}),
+    ("clear", ("sonar-stuck 3",), {}), ("clear", ("sonar-stuck 3 0.2",), {}), ("clear", ("odd",), {}),
+    ("press", ("stop-button",), {"during": "20 ms"}), ("press", ("bumper front 1",), {}),
+    ("press", ("bumper front 2", 10_000_000), {}), ("press", ("bumper odd 1",), {}), ("press", ("sonar-dead 2",), {}),
+    ("press", ("",), {}), ("clear", ("bumper front 1",), {}), ("drop_link", ("40 ms",), {}), ("drop_link", (), {}),
+    ("clear", ("link-down",), {}), ("rewind", ("0.3 s",), {}), ("finish", (), {}), ("press", ("stop-button",), {}),
+    ("remove", ("pole",), {}), ("clear", ("link-down",), {}),
+)  # fmt: skip
+
+
+def interventions(_draw: Random) -> Iterator[str]:
+    """Change what runs from outside: things, faults, buttons and the line, in mode adapter and direct."""
+    with TemporaryDirectory(prefix="p2os-test-") as name:
+        for what, scenario in [*scenarios(Path(name))][:2]:
+            bench = Bench(replace(scenario, changes=(), hands=(), faults=()), slice_ns=SLICE_NS)
+            for number, (method, arguments, named) in enumerate(DONE):
+                if "finish" not in [done[0] for done in DONE[:number]]:
+                    bench.run_until(bench.now + 25 * NS_PER_MS)
+                reported = tried(getattr(bench, method), *arguments, **named)
+                yield f"{what} {method} {arguments}: {reported} at {bench.now} {run_of(bench).waits.since(bench.now)}"
+            yield from (line for line in shown_lines(bench) if '"k":"pin"' not in line and '"k":"wire"' not in line)
+
+
 def folders(_draw: Random) -> Iterator[str]:
     """Run into folders: what is reported, what is left, what is refused."""
     before = Path.cwd()
@@ -493,6 +525,6 @@ def numbers(_draw: Random) -> Iterator[str]:
 TRACES: dict[str, Trace] = {
     "declared": declared_of("robot_bench", "robot_bench.bench", "robot_bench.running"),
     "refusals": refusals, "numbers": numbers, "ports": at_ports, "together": together,
-    "expectations": expectations, "runs": runs, "folders": folders,
+    "expectations": expectations, "interventions": interventions, "runs": runs, "folders": folders,
 }  # fmt: skip
 test_what_short_runs_are_is_what_was_approved = judge_of(__file__, TRACES)

@@ -18,6 +18,7 @@ from bluepill_sim.program.line_table import read_lines
 from bluepill_sim.program.mutants import mutants
 from bluepill_sim.program.static_code import StaticCode
 from bluepill_sim.program.version_difference import LineDifference
+from p2os.toml_record import number_of, table_of
 from robot_bench.campaign.last_moment import LastMoment, last_moment
 from robot_bench.campaign.trial import GoalResult, HullContact, Outcome, Trial, TrialVerdict, run_trial, trial_of
 from robot_bench.campaign.variants import against, changed_back, diversity, fault_line
@@ -125,12 +126,14 @@ def shrinking(draw: Random) -> Iterator[str]:
 
             def judge(
                 one: Trial, way: FailureMode | None, until: int | None,
-                asked: list[str] = asked, needed: Any = needed, is_early: bool = is_early,
+                asked: list[str] = asked, needed: Any = needed, is_early: bool = is_early, number: int = number,
             ) -> Failure | None:  # fmt: skip
                 there = with_world(one)
                 held = [(thing.list_name, own_table(there, thing)) for thing in things(there)]
                 keeps = all(any(alike(one, other) for other in held) for one in needed)
                 found = keeps and float(str(one.table["duration_s"])) >= 1.2
+                if number % 2:  # it has to begin where it does, to some figures
+                    found = found and 0.508 <= number_of(table_of(one.table, "start"), "x_m") <= 0.514
                 asked.append(f"{len(things(one))}{'+' if found else '-'} {until} {one.table['duration_s']}")
                 mode = FailureMode(what="touches nothing", part="front")
                 at = round(1.1 * S) + len(held)

@@ -6,11 +6,13 @@ from pathlib import Path
 from random import Random
 from tempfile import mkdtemp
 from types import SimpleNamespace
+from typing import Any
 
 from bluepill_sim.core import Watchpoint
 from bluepill_sim.program.line_table import read_lines
 from bluepill_sim.program.variables import read_variables
 from robot_bench.bench import Bench
+from robot_bench.cli.debugging.future import Future
 from robot_bench.cli.debugging.gdb_beside import GdbBeside
 from robot_bench.cli.debugging.hands import drive_words, driven_by, hand_of, saved_as
 from robot_bench.cli.debugging.points import STEPS, other_lines, point_of
@@ -213,7 +215,39 @@ def words(_draw: Random) -> Iterator[str]:
     yield said([drive_words((0.12345, -7.06)), trouble_of(UsageError("no", hint="yes")), trouble_of(UsageError("no"))])
 
 
+def paces(_draw: Random) -> Iterator[str]:
+    """Say what time the pace has come to: of a run that stands, keeps up, or lags by a little less or more."""
+    for speed in (0.0, 0.1, 0.5, 0.75, 1.0, 1.5, 4.0):
+        for is_step in (False, True):
+            for lag_ms in (0, 250, 300, 375, 400, 499, 500, 501, 750, 751, 1999, 2001):
+                run: Any = SimpleNamespace(
+                    speed=speed, _is_step=is_step, _base=(10**9, 0), _chosen=SimpleNamespace(head_ns=5 * NS_PER_MS),
+                    _least=max(1, int(10 * speed)),
+                )  # fmt: skip
+                clock_ns = 10**9 + round((lag_ms + 5) * NS_PER_MS / (speed or 1.0))
+                yield said([speed, is_step, lag_ms, RunSession._due(run, clock_ns), run._base])
+                run._base = None
+                yield said([RunSession._due(run, clock_ns), run._base])
+        yield said(RunSession._least.fget(SimpleNamespace(speed=speed)))  # type: ignore[attr-defined]  # a property
+
+
+def resumed(_draw: Random) -> Iterator[str]:
+    """Go on from where a run stands: at a breakpoint it makes one step without any, and what was hit is forgotten."""
+    for pc in (4, 8):
+        for is_over in (False, True):
+            engine = SimpleNamespace(breakpoints={8, 12}, watchpoints={16})
+            board, seen = SimpleNamespace(pc=pc, chip=SimpleNamespace(engine=engine)), list[object]()
+            future: Any = SimpleNamespace(
+                _hits=[(1, 2, "x")], machine=SimpleNamespace(board=board), is_over=is_over,
+                execution=SimpleNamespace(step=lambda e=engine, s=seen: s.append([*e.breakpoints, *e.watchpoints])),
+            )  # fmt: skip
+            Future.resume(future)
+            yield said([pc, is_over, future._hits, seen, sorted(engine.breakpoints), sorted(engine.watchpoints)])
+
+
 TRACES: dict[str, Trace] = {
+    "resumed": resumed,
+    "paces": paces,
     "words": words,
     "declared": declared_of("robot_bench.cli.debugging"),
     "gdb": gdb,

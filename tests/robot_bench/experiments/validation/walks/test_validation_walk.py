@@ -1,5 +1,6 @@
 """What experiments measure of runs made by hand, and which runs they ask for, at random."""
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +11,7 @@ from unittest import mock
 
 from p2os.view.header import PageHeader
 from robot_bench.events.kinds import Contact, Note
-from robot_bench.experiments.validation import experiments, page, sensors, trials
+from robot_bench.experiments.validation import encoders, experiments, page, sensors, trials
 from robot_bench.experiments.validation.encoders import (
     count_figures,
     encoder_figures,
@@ -36,6 +37,7 @@ from robot_bench.scenario.goals.judging import Judgement
 from robot_bench.scenario.scenario import Scenario
 from simbase.timing import NS_PER_S
 from tests.robot_bench.experiments.validation.test_validation_findings import MODES, MadeRun, nominal_of
+from tests.robot_bench.recording.records import pose
 from tests.tools.suite.approved import Trace, judge_of, said, tried
 from tests.tools.suite.declared import declared_of
 
@@ -254,7 +256,23 @@ def carried_out(draw: Random) -> Iterator[str]:
             asked.clear()
 
 
+def half_turns(_draw: Random) -> Iterator[str]:
+    """Tell which wheels turn more than half a turn between two samples of their angles, and which way round."""
+    turn = round(math.tau * 10**6)
+    for left, right in ((0.4, 0.4), (0.6, 0.4), (0.4, -0.6), (-0.6, 0.6), (0.5, -0.5), (1.2, -1.2)):
+        for period_s in (0.05, 0.1):
+            poses = [pose(50_000_000 * n, la=round(n * left * turn), ra=round(n * right * turn))
+                     for n in range(6)]  # fmt: skip
+            record: Any = SimpleNamespace(poses=poses)
+            nominal: Any = SimpleNamespace(encoder_period_s=period_s)
+            for start in (0, 50_000_000, 200_000_001):
+                yield said([left, right, period_s, start, sorted(encoders._ambiguous(record, nominal, start))])
+    steps = encoders.ENCODER_STEPS
+    yield said([encoders._within_turn(part * steps) for part in (0.0, 0.25, 0.49, 0.5, 0.51, 1.0, 3.75, -0.5, -0.75)])
+
+
 TRACES: dict[str, Trace] = {
+    "half turns": half_turns,
     "validations": validations, "trials": trials_asked, "gates": gates_seen, "pages": pages,
     "carried out": carried_out, "declared": declared_of("robot_bench.experiments.validation"),
 }  # fmt: skip

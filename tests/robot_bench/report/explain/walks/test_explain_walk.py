@@ -1,10 +1,12 @@
 """Why runs failed, drawn at random: what is asked of their programs, each step, and what is found."""
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from random import Random
 from types import SimpleNamespace
 from typing import Any
+from unittest import mock
 
 from adapter_sim.pinout import WireRole, load_pinout
 from bluepill_sim.core import BLOCK
@@ -327,6 +329,8 @@ def bounds(_draw: Random) -> Iterator[str]:
             slow.poses[0] = replace(slow.poses[0], right=round(3 * step * 1e6))
             yield f"{off} {step} {findings.obeyed(slow, step, at, [])}"
     yield from seen_alone()
+    yield from near_bearings()
+    yield from ways_of_parts()
     hits = [Contact(t=t, what=f"'{t}'", x_m=1.0, y_m=0.0) for t in (3 * S, 5 * S)]
     for end in ({}, {"goals_met": ["a"]}, {"failures": ["reach: x"]}):
         found = driven_run((0.0, AHEAD), until_s=12.0, contacts=hits, end=end)
@@ -334,6 +338,39 @@ def bounds(_draw: Random) -> Iterator[str]:
     for way, until in (([(0, AHEAD), (10, STILL)], 15), ([(0, AHEAD), (7 * MS, STILL)], 10 * MS), ([(5, SPIN)], 9)):
         for by in (-1, 0, 1):
             yield findings.held_codes(way, until + SAME_NS + by)
+
+
+def ways_of_parts() -> Iterator[str]:
+    """Tell the codes over a time whose first and last nanosecond have edges."""
+    seen: Any = SimpleNamespace(
+        levels_at=lambda since: {"one": since % 2 == 0},
+        edges=[(at, "one", at % 3 == 0) for at in (90, 99, 100, 101, 150, 199, 200, 201)],
+    )
+    asked: Any = SimpleNamespace(_codes=lambda levels: (int(levels["one"]), 0))
+    for since, until in ((100, 200), (99, 201), (101, 199), (150, 150)):
+        yield said(Prober.way(asked, seen, since, until))
+
+
+def near_bearings() -> Iterator[str]:
+    """Touch things at bearings about those at which sensors count as near, with pins that have gone low lately."""
+    hit = Contact(t=6 * S, what="'it'", x_m=1.0, y_m=0.0)
+    for low_ns in (600 * MS - 1, 600 * MS, 600 * MS + 1, None):
+        on: dict[str, float | tuple[float, ...]] = dict.fromkeys(
+            DISTANCES, 3.0 if low_ns is None else (3.0, (hit.t - low_ns) / S)
+        )
+        run = driven_run((0.0, AHEAD), until_s=12.0, on=on)
+        for degrees in (*((sign * whole + 0.5 * half) for whole in (0, 25, 60, 90) for sign in (-1, 1)
+                          for half in (-1, 0, 1)), 180):  # fmt: skip
+            scene = Scene(run)
+            for sensor in scene.sensors if low_ns is None else scene.sensors[3:4]:
+                bearing = math.remainder(sensor.heading_rad + math.radians(degrees), math.tau)
+                with (
+                    mock.patch.object(Scene, "bearing_rad", return_value=bearing),
+                    mock.patch.object(Scene, "should_see", return_value={}),
+                    mock.patch.object(Scene, "may_see", return_value=False),
+                ):
+                    found = ContactAnalysis(scene, None, hit)
+                    yield said([low_ns, degrees, found.on, found._is_in_sight()])
 
 
 def seen_alone() -> Iterator[str]:
