@@ -100,8 +100,8 @@ class HandDrivenBody:
             self.steps_within = self._steps_within
         inner.is_powered = self._is_powered or rims is not None
 
-    def _step(self, _left_mps: float, _right_mps: float) -> Wheels:
-        return self._hold(0.0, 0.0, 1)[0]
+    def _step(self, left_mps: float, right_mps: float) -> Wheels:
+        return self._hold(left_mps, right_mps, 1)[0]
 
     def _hold(self, _left_mps: float, _right_mps: float, steps: int) -> Sequence[Wheels]:
         left_mps, right_mps = self._rims or (0.0, 0.0)

@@ -1,6 +1,7 @@
 """Each line that verbs print of comparisons, metrics, fits and explanations that are made up, and how they end."""
 
 import contextlib
+import itertools
 from collections.abc import Iterator
 from pathlib import Path
 from random import Random
@@ -13,6 +14,7 @@ import numpy as np
 from bluepill_sim.analysis.waveforms.alignment import Alignment, ChannelPair, Clock, Met, Tolerance
 from bluepill_sim.analysis.waveforms.comparison import Jump, Miswired, PinComparison, Unexplained
 from p2os.cli.main import run as p2os
+from p2os.robots.parameters import load_parameters
 from robot_bench.campaign.variants.fault_line import FaultLine
 from robot_bench.cli import compare_pins, explain, sweep
 from robot_bench.cli.experiments import compare, fit, metrics, validate
@@ -66,6 +68,36 @@ def pins(draw: Random) -> Iterator[str]:
     for words in (["D0=PB7"], ["a=b=PA1", "D1 = motor1_comm1"], ["D0="], ["=PA0"], ["D0"], ["D0=PA0", "D0=PA1"]):
         yield tried(compare_pins._declared, words, {"motor1_comm1": "PB9"})
     yield said([tried(compare_pins._rate, words) for words in ("", "24MHz", "1k", "fast", "-3")])
+
+
+def compared_pins(draw: Random) -> Iterator[str]:
+    """Ask for comparisons of pins: what is asked of them, drawn, printed, and how it ends."""
+    calls: list[object] = []
+    model: Any = SimpleNamespace(name="run", start_ns=0.0, end_ns=1e9, signals={"PA1": 1, "PB9": 2})
+    seen: Any = SimpleNamespace(name="board.csv", start_ns=0.0, end_ns=1e9, sample_ns=10.0, rate_from="",
+                                signals={"Con": 1, "con2": 2, "D3": 3})  # fmt: skip
+    clock = Clock(0.0, 0.0, 1e-6)
+    place = "bluepill_sim.analysis.waveforms"
+    for words in ("", "--json", "--wire D3=PA1 --rate 24MHz", "--ppm 0 --jitter 2.5", "--ppm 25000"):
+        for count in (0, 2):
+            found = PinComparison(
+                alignment=Alignment(clock, 3, None), limits=Tolerance(40.0, 1e-3, (0.0, 1e9), (0.0, 1e9)), met=[],
+                unjudged=0, miswired=[], unexplained=count, first=unexplained(draw) if count else None,
+            )  # fmt: skip
+
+            def compare_(*given: object, found: PinComparison = found, **named: object) -> PinComparison:
+                calls.append([given[2], named])
+                return found
+
+            with (
+                mock.patch.object(compare_pins, "_model", return_value=(model, {"con": "PA1", "con2": "PC7"})),
+                mock.patch(f"{place}.reading.read_waveforms", lambda *given: calls.append(given) or seen),
+                mock.patch(f"{place}.comparison.wires_of", lambda *given: given[2]),
+                mock.patch(f"{place}.comparison.compare_pins", compare_),
+            ):
+                yield from printed(p2os, ["compare-pins", "run", "board.csv", *words.split()])
+            yield said([words, calls])
+            calls.clear()
 
 
 def measured(draw: Random) -> Iterator[str]:
@@ -296,6 +328,42 @@ def unequal(_draw: Random) -> Iterator[str]:
         yield said([ours, theirs, ended.partition(":")[0], shown])
 
 
+def pages_and_schemas(_draw: Random) -> Iterator[str]:
+    """Begin pages of comparisons, of ways as long as they are and of one time alone, and print what files may have."""
+    part = SimpleNamespace(signal="s", bound=SimpleNamespace(stage="w"))
+    for times in ((0.0, 1.5), (0.5, 0.5), (-1.0, 2.0), (0.0, 0.0), (0.0, 1e-9), (0.0, 2e-9)):
+        for poses in (("truth", "truth"), ("truth", "odometry")):
+            for other in ("a", "b"):
+                robots: Any = [SimpleNamespace(name=name, meta={}, parameters=load_parameters("p2dx"))
+                               for name in ("a", other)]  # fmt: skip
+                found: Any = SimpleNamespace(
+                    ours=SimpleNamespace(t_s=times), theirs=SimpleNamespace(t_s=times), one=robots[0], other=robots[1],
+                    how=SimpleNamespace(poses=poses), parts=[],
+                    origin=None if other == "a" else (part, 1.25),
+                )  # fmt: skip
+                with (
+                    mock.patch.object(comparison_page, "_add_way"),
+                    mock.patch.object(comparison_page, "_add_differences"),
+                    mock.patch.object(comparison_page, "page_of", lambda recording: recording),
+                    mock.patch.object(comparison_page, "ViewRecording", Recording),
+                ):  # fmt: skip
+                    made: Any = comparison_page.comparison_page(found, ["one", "two"])
+                yield said([times, poses, made.header, made.rows])
+    for words in ("check --schema", "campaign --schema"):
+        yield from itertools.islice(printed(p2os, words.split()), 12)
+
+
+class Recording:
+    """What is written on a page."""
+
+    def __init__(self, header: object) -> None:
+        self.header, self.rows = header, list[object]()
+
+    def add(self, header: object) -> Any:
+        self.rows.append(header)
+        return SimpleNamespace(append=lambda *row: self.rows.append(row))
+
+
 def validated(_draw: Random) -> Iterator[str]:
     """Validate, by runs that are made up: what is printed, and how it ends."""
     for passed in (True, False):
@@ -315,7 +383,15 @@ def validated(_draw: Random) -> Iterator[str]:
 
 
 TRACES: dict[str, Trace] = {
-    "pins": pins, "measured": measured, "compared": compared, "fitted": fitted, "explained": explained,
-    "explained campaigns": explained_campaigns,     "validated": validated, "unequal": unequal,
-}  # fmt: skip
+    "pins": pins,
+    "compared pins": compared_pins,
+    "measured": measured,
+    "compared": compared,
+    "fitted": fitted,
+    "explained": explained,
+    "explained campaigns": explained_campaigns,
+    "validated": validated,
+    "unequal": unequal,
+    "pages and schemas": pages_and_schemas,
+}
 test_each_line_of_what_came_is_what_was_approved = judge_of(__file__, TRACES)

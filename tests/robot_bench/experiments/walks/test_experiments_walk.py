@@ -18,7 +18,8 @@ from robot_bench.experiments import alignment, drive_files, parting, trajectory_
 from robot_bench.experiments.aria_logs import is_aria_log, read_aria_log
 from robot_bench.experiments.comparison import How, compare
 from robot_bench.experiments.drive_files import is_recording, read_drive, write_tum
-from robot_bench.experiments.sensitivity import ParameterEffect, SampleDesign, outcome_names, read_range
+from robot_bench.experiments.sensitivity import ParameterEffect, SampleDesign, outcome_names, outcomes_of, read_range
+from robot_bench.scenario.loading import load_scenario
 from tests.robot_bench.experiments.walks.drawn_drives import (
     P2DX,
     of_drive,
@@ -28,6 +29,7 @@ from tests.robot_bench.experiments.walks.drawn_drives import (
     steps_drawn,
     way_of,
 )
+from tests.robot_bench.firmware.hurried import hurried
 from tests.tools.suite.approved import Trace, judge_of, said, tried
 from tests.tools.suite.declared import declared_of
 
@@ -241,7 +243,19 @@ def ranges(draw: Random) -> Iterator[str]:
         yield said([tried(outcome_names, found, wanted), tried(outcome_names, [{"path_m": 1.0}], wanted)])
 
 
+def outcomes(_draw: Random) -> Iterator[str]:
+    """Run short scenarios for what they come to: with goals that have a margin, and that have none."""
+    looks: list[int] = []
+    dodge = load_scenario("dodge", firmware=hurried("dodge", 1)).with_options(
+        mode="direct", body="kinematic", duration_s=0.6)  # fmt: skip
+    for scenario in (dodge, replace(dodge, goals=()), load_scenario("two-dodge")):
+        yield tried(outcomes_of, scenario, looks.append)
+        yield said(looks[-1:])
+        looks.clear()
+
+
 TRACES: dict[str, Trace] = {
+    "outcomes": outcomes,
     "trajectories": trajectories, "onsets": onsets, "partings": partings, "files": files,
     "declared": declared_of("robot_bench.drives", "robot_bench.experiments"), "ranges": ranges,
 }  # fmt: skip

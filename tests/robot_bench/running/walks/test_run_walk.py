@@ -25,7 +25,7 @@ from robot_bench.bench.bench import Bench, run_of
 from robot_bench.bench.board import cut_wires, pins_of
 from robot_bench.bench.expectations import Expectations
 from robot_bench.bench.far_end import FarEnd
-from robot_bench.bench.hand_driven_body import HandDrivenBody
+from robot_bench.bench.hand_driven_body import HandDrivenBody, hand_driven
 from robot_bench.bench.interventions import Interventions
 from robot_bench.bench.robot_run import RobotRun
 from robot_bench.bench.waiting import EventWait, mark_of
@@ -377,6 +377,35 @@ def folders(_draw: Random) -> Iterator[str]:
             os.chdir(before)
 
 
+def by_hand(_draw: Random) -> Iterator[str]:
+    """Drive a body by hand: what its steps, its power and its torques are asked, with and without the hand."""
+    calls: list[str] = []
+    for speeds in (None, (0.3, 0.0), (-0.2, 1.5), (0.0, -2.0), None):
+        for is_powered in (True, False):
+            inner: Any = Acted(calls, "body", hold=[["w1", "w2"]] * 9, step=["w"] * 9, ramp=[["r"]] * 9,
+                               steps_within=[3] * 9, snapshot=["kept"] * 9)  # fmt: skip
+            inner.dt_ns, inner.is_powered, inner.state = 5, True, "here"
+            body = HandDrivenBody(inner, 0.4)
+            body.drive_by_hand(speeds)
+            yield said([body.step(0.1, 0.2), body.hold(0.1, 0.2, 2), body.ramp([(0.1, 0.2), (0.3, 0.4)])])
+            yield said([body.steps_within(0.1, 0.25), body.rims, body.dt_ns, body.state])
+            yield said([body.is_powered, inner.is_powered])
+            body.limit_torques(1.0, 2.0)
+            body.is_powered = is_powered
+            yield said([body.is_powered, inner.is_powered])
+            before = body.snapshot()
+            body.drive_by_hand((0.1, 0.1))
+            yield said([before, body.is_powered, inner.is_powered, body.rims])
+            body.restore(before)
+            body.jump(3)
+            yield said([body.rims, body.is_powered, inner.is_powered, "jump" in vars(body), body.step(0.0, 0.0)])
+            yield said([speeds, is_powered, taken(calls)])
+    plain = HandDrivenBody(SimpleNamespace(dt_ns=1, is_powered=False, **dict.fromkeys(  # type: ignore[arg-type]  # as much
+        ("step", "hold", "ramp", "steps_within"), len)), 0.4)  # fmt: skip
+    yield said([hasattr(plain, "limit_torques"), plain.is_powered, tried(getattr, plain, "_inner") != ""])
+    yield said([tried(hand_driven, 3), hand_driven(plain) is plain])
+
+
 def refusals(_draw: Random) -> Iterator[str]:
     """Ask for what verbs refuse before, and by one condition at a time: of robots together, of chips of others."""
     calls: list[str] = []
@@ -524,7 +553,7 @@ def numbers(_draw: Random) -> Iterator[str]:
 
 TRACES: dict[str, Trace] = {
     "declared": declared_of("robot_bench", "robot_bench.bench", "robot_bench.running"),
-    "refusals": refusals, "numbers": numbers, "ports": at_ports, "together": together,
+    "refusals": refusals, "by hand": by_hand, "numbers": numbers, "ports": at_ports, "together": together,
     "expectations": expectations, "interventions": interventions, "runs": runs, "folders": folders,
 }  # fmt: skip
 test_what_short_runs_are_is_what_was_approved = judge_of(__file__, TRACES)

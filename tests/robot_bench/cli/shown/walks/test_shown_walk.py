@@ -1,22 +1,27 @@
 """What pages are shown of runs: panels of the chip, what hands may do and have done, live runs and fleets as asked."""
 
 import contextlib
+import io
 import os
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
+from types import SimpleNamespace
 from typing import Any
+from unittest import mock
 
 from bluepill_sim.board import BluePill
+from bluepill_sim.cli.browser.viewing import ViewedRun
 from p2os.view.header import PageSection, PageText
 from p2os.view.recording import ViewRecording
 from p2os.view.run_control import RunCommand
 from p2os.view.targets import ViewPanel
 from robot_bench.bench import Bench
+from robot_bench.cli import run as run_verb
 from robot_bench.cli.debugging.hands import hand_of
-from robot_bench.cli.shown import chip_panels, saved_hands
+from robot_bench.cli.shown import chip_panels, live_target, lone_board, saved_hands
 from robot_bench.cli.shown.fleet_hands import FleetHands
 from robot_bench.cli.shown.live_fleet import LiveFleet
 from robot_bench.cli.shown.live_run import BenchBuilt, BenchReleased, Happened, LiveRun
@@ -24,7 +29,9 @@ from robot_bench.cli.shown.looked_panels import LOOK_NS, MOST_LOOKS, LookedPanel
 from robot_bench.cli.shown.offered_hands import hands_of
 from robot_bench.cli.shown.targets import run_target, scenario_target
 from robot_bench.scenario.loading import load_scenario
+from robot_bench.scenario.scenario import Scenario
 from tests.robot_bench.firmware.hurried import hurried_scenario
+from tests.tools.suite.acted import Acted, taken
 from tests.tools.suite.approved import judge_of, said, tried
 from tests.tools.suite.declared import declared_of
 
@@ -245,7 +252,112 @@ def looks(_draw: Random) -> Iterator[str]:
     yield said([made.asked("a", "1"), made.panels])
 
 
+class Live:
+    """Takes the place of a run that a page shows: notes what it is made with and asked."""
+
+    def __init__(self, calls: list[str], scenario: Any, **named: Any) -> None:
+        self.stays = False
+        self.source: Any = Acted(calls, "source")
+        self.scenario, self._calls = scenario, calls
+        calls.append(said(["live", scenario.name, {key: one for key, one in named.items() if key != "on_wait"}]))
+        if "on_wait" in named:
+            named["on_wait"]()
+
+    def drive(self, bench: Any) -> str:
+        self._calls.append(said(["drive", self.stays, bench]))
+        return "driven"
+
+    def stay(self) -> None:
+        self._calls.append(said(["stay", self.stays]))
+
+
+def held(_draw: Random) -> Iterator[str]:
+    """Show boards, runs and fleets on pages that are none, driven by whatever is asked for."""
+    calls: list[str] = []
+
+    @contextlib.contextmanager
+    def noted(*given: object, **named: object) -> Iterator[str]:
+        names = [one.name if isinstance(one, Scenario) else "words" if callable(one) else str(one) for one in given]
+        calls.append(said([*names, named]))
+        yield "port"
+        calls.append("closed")
+
+    def live_of(scenario: Any, **named: Any) -> Live:
+        return Live(calls, scenario, **named)
+
+    display: Any = Acted(calls, "display")
+    chosen = load_scenario("motors")
+    with contextlib.ExitStack() as stack:
+        for module in (lone_board, run_verb):
+            for part, other in (("gdb_port", noted), ("shown", noted), ("LiveRun", live_of), ("LiveFleet", live_of)):
+                if hasattr(module, part):
+                    stack.enter_context(mock.patch.object(module, part, other))
+        bench = Acted(calls, "bench")
+        bench.now, bench.trace = 1_250_000_000, Acted(calls, "trace")  # type: ignore[attr-defined]
+        stack.enter_context(mock.patch.object(lone_board, "Bench", lambda scenario, trace: calls.append(
+            f"{scenario.name} {type(trace).__name__}") or bench))  # fmt: skip
+        for ends in ([], [KeyboardInterrupt()]):
+            bench._answers["finish"] = [*ends]
+            viewed = ViewedRun(firmware=chosen.firmware, end_ns=5, usart_baud=9600, gdb=3, is_opened=False)
+            with contextlib.redirect_stderr(io.StringIO()) as shown, contextlib.suppress(KeyboardInterrupt):
+                lone_board.view_board(viewed)
+            yield said([shown.getvalue(), taken(calls)])
+        with run_verb.viewed(chosen, 0.5, display, ["a"], is_opened=True, gdb=0) as drive:
+            yield said([drive(bench), taken(calls)])  # type: ignore[arg-type]  # as much of it as is asked
+        with mock.patch.object(
+            run_verb, "run_together", lambda *given, **named: [given[1:], sorted(named), named["force"]]
+        ):
+            yield said(run_verb.run_viewed_fleet(chosen, Path("f"), 2.0, display, force=True, is_opened=False))
+            yield taken(calls)
+        other: Any = SimpleNamespace(
+            live_scene=noted, met=noted, refuse_without_pins=lambda one: calls.append(one.name),
+            with_inputs=lambda inputs: f"with {inputs}",
+        )  # fmt: skip
+        for ros, inputs, foxglove in ((None, None, None), ("node", None, None), (None, Path("in"), None),
+                                      ("node", Path("in"), None), ("", None, None), (None, None, "9000")):  # fmt: skip
+            with (
+                mock.patch.object(run_verb, "network_of", return_value=other),
+                mock.patch.object(run_verb, "viewer_of", return_value=other),
+                run_verb.driven(chosen, ros=ros, inputs=inputs, foxglove=foxglove, origins=["o"]) as by,
+            ):
+                yield said([ros, inputs, foxglove, by])
+            yield taken(calls)
+
+
+def held_targets(_draw: Random) -> Iterator[str]:
+    """Run scenarios that a page shows, with and without GDB beside it, to their ends and interrupted."""
+    calls: list[str] = []
+    chosen = load_scenario("motors")
+
+    def live_of(scenario: Any, **named: Any) -> Live:
+        return Live(calls, scenario, **named)
+
+    with TemporaryDirectory(prefix="p2os-test-") as name, mock.patch.object(live_target, "LiveRun", live_of):
+        for was_interrupted in (False, True):
+            for is_kept in (False, True):
+                done = SimpleNamespace(folder=Path(name), was_interrupted=was_interrupted)
+                page = SimpleNamespace(header="header")
+                with (
+                    mock.patch.object(live_target, "run_scenario", lambda *given, d=done, **named: calls.append(
+                        said([given[0].name, given[1], named["drive"]("bench")])) or d),
+                    mock.patch.object(live_target, "make_next_folder", "{}-001".format),
+                    mock.patch.object(live_target, "kept", return_value=page if is_kept else None),
+                    mock.patch.object(live_target, "read_run"),
+                    mock.patch.object(live_target, "run_report", return_value=page),
+                    mock.patch.object(live_target, "GdbPort", lambda port: Acted(calls, f"gdb {port}")),
+                    mock.patch.object(live_target, "say_where", lambda _port, one: calls.append(one.name)),
+                ):  # fmt: skip
+                    target = live_target.live_target(chosen)
+                    for one in (target, target.debugged(3)) if target.debugged is not None else ():
+                        try:
+                            one.run()
+                            yield taken(calls)
+                        except KeyboardInterrupt:
+                            yield f"interrupted {taken(calls)}"
+
+
 TRACES = {
+    "held": held, "held targets": held_targets,
     "panels": panels, "hands": hands, "live": live, "fleet": fleet, "fleet_hands": fleet_hands, "looks": looks,
     "declared": declared_of("robot_bench.cli.shown"),
 }  # fmt: skip

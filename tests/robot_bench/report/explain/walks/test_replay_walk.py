@@ -7,6 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
+from types import SimpleNamespace
+from typing import Any
 from unittest.mock import patch
 
 from adapter_sim.pinout import WireDirection, WireRole, load_pinout
@@ -162,5 +164,30 @@ def resets(draw: Random) -> Iterator[str]:
                 yield said([net, edges, ChipReplay(file, made).exact_until])
 
 
-TRACES = {"resets": resets, "parts": parts, "looks": looks}
+def recordings(draw: Random) -> Iterator[str]:
+    """Record blocks until there are too many, in slices that grow while few of them run."""
+    size = RECORD.size
+    with patch.object(replay, "MOST_ROWS", 640):
+        for counts in ([0] * 9, [19, 20, 21] * 9, [20] * 40, [310, 9, 1, 99], [640], [641], [319, 1, 5],
+                       [draw.randrange(60) for _ in range(30)]):  # fmt: skip
+            for parts_at in (None, 3):
+                drained, asked = iter([bytes(size * count) for count in counts]), list[object]()
+                board = SimpleNamespace(now_ns=0, chip=SimpleNamespace(
+                    record_blocks=lambda _room, d=drained: SimpleNamespace(drain_packed=lambda: next(d, b"")),
+                    stop_recording=lambda a=asked: a.append("stopped"),
+                ))  # fmt: skip
+
+                def go_on(until: int, memory_ns: int, board: Any = board, asked: list[object] = asked) -> None:
+                    asked.append([until - board.now_ns, memory_ns])
+                    board.now_ns = until
+
+                seen = SimpleNamespace(memory=[], has_more_rows=None, packed_rows=b"")
+                made: Any = SimpleNamespace(board=board, _seen=seen, _go_on=go_on)
+                with patch.object(replay, "_have_parted", lambda *_given, a=asked, p=parts_at: len(a) == p):
+                    beside: Any = None if parts_at is None else "other"
+                    parted = ChipReplay._go_on_recording(made, 10**9, 7, beside)
+                yield said([parted, asked, seen.has_more_rows, len(seen.packed_rows) / size])
+
+
+TRACES = {"recordings": recordings, "resets": resets, "parts": parts, "looks": looks}
 test_what_replays_show_is_what_was_approved = judge_of(__file__, TRACES)
