@@ -478,7 +478,7 @@ def _disturbance(table: Table, where: Where) -> Disturbance:
 def _area(value: object, where: Where) -> tuple[float, float, float, float] | None:
     if value is None:
         return None
-    numbers = [float(item) for item in value if isinstance(item, (int, float))] if isinstance(value, list) else []
+    numbers = [float(item) for item in cast("Sequence[object]", value) if isinstance(item, (int, float))]
     if len(numbers) != 4 or numbers[0] >= numbers[2] or numbers[1] >= numbers[3]:
         raise ScenarioError(f"{where}: area_m must be [least x, least y, greatest x, greatest y]")
     return numbers[0], numbers[1], numbers[2], numbers[3]

@@ -18,6 +18,7 @@ from p2os.robots.parameters import load_parameters
 from robot_bench.campaign.variants.fault_line import FaultLine
 from robot_bench.cli import compare_pins, explain, sweep
 from robot_bench.cli.experiments import compare, fit, metrics, validate
+from robot_bench.cli.project import files as project_files
 from robot_bench.drives.latency_budget import STEPS, WHOLE, LatencyBudget
 from robot_bench.experiments import comparison_page
 from robot_bench.experiments.fitting.least_squares import Estimate, Fit
@@ -287,7 +288,7 @@ def explained_campaigns(_draw: Random) -> Iterator[str]:
 
 def lines_of_campaigns() -> Iterator[str]:
     """Look for a line in a campaign: by another version, by changes until none is left, and until the time is over."""
-    for tick_s in (1, 40):
+    for tick_s in (1, 20, 40):
         for other in (None, "good.elf"):
             calls: list[object] = []
             now = iter(range(0, 10**15, tick_s * 10**9))
@@ -310,6 +311,14 @@ def lines_of_campaigns() -> Iterator[str]:
                 mock.patch.object(explain, "ChangedBack", changed),
             ):
                 yield said([tick_s, explain._line_of_campaign(Path("camp"), other, 1.0), calls])  # type: ignore[arg-type]
+
+
+def not_written(_draw: Random) -> Iterator[str]:
+    """Write files of a project where the system refuses it, with and without the name of a file."""
+    for error in (OSError(28, "No space left on device"), OSError(13, "Permission denied", "a/b")):
+        with in_folder() as folder, mock.patch.object(Path, "open", side_effect=error):
+            ended = tried(project_files.write_files, Path("made/here"), {"a.txt": "a"})
+            yield said([ended, sorted(path.name for path in folder.iterdir())])
 
 
 def unequal(_draw: Random) -> Iterator[str]:
@@ -392,6 +401,7 @@ TRACES: dict[str, Trace] = {
     "explained campaigns": explained_campaigns,
     "validated": validated,
     "unequal": unequal,
+    "not written": not_written,
     "pages and schemas": pages_and_schemas,
 }
 test_each_line_of_what_came_is_what_was_approved = judge_of(__file__, TRACES)

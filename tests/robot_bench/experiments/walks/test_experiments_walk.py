@@ -215,6 +215,11 @@ def files(draw: Random) -> Iterator[str]:
         yield said([is_recording(folder / each) for each in ("gone", ".")])
     for line in (";Time", "; TIME\tX", "laser odometry log", "LaserOdometryLog 3", "Time", ""):
         yield said([is_aria_log(line), tried(read_aria_log, "mine", [line], P2DX)])
+    for columns in ("x,y,th,leftV", "rightV,x,y,th", "x,y,th,leftV,rightV", "x,y,th,encX,encY,encTh", "x,y", "x,y,th"):
+        rows = [f"{second},{','.join(str(second * 100 + n) for n, _ in enumerate(columns.split(',')))}\n"
+                for second in range(3)]  # fmt: skip
+        lines = [f";Time,{columns}\n", *rows]
+        yield f"{columns} {tried(lambda lines=lines: said([*of_drive(read_aria_log('mine', lines, P2DX))]))}"
 
 
 def ranges(draw: Random) -> Iterator[str]:

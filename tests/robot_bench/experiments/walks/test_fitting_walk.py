@@ -16,7 +16,7 @@ from p2os.pioneer.world import load_world
 from p2os.pioneer.world.model import Pose
 from p2os.protocol.commands import rvel, vel
 from robot_bench.drives.drive import Drive, Floats, Steps, Trajectory, steps_of
-from robot_bench.experiments.fitting import clocks, examples, ramps, sonar, umbmark, wheels
+from robot_bench.experiments.fitting import clocks, examples, ramps, rounding, sonar, umbmark, wheels
 from robot_bench.experiments.fitting.echoes import Bearings
 from robot_bench.experiments.fitting.least_squares import Estimate, Fit, Parameter, Rounding, fit
 from robot_bench.experiments.fitting.resampling import best_of_resamples, estimate_of
@@ -227,6 +227,12 @@ def shifted(draw: Random) -> Iterator[str]:
     yield said([clocks.without_delays(both, why).as_plain() for why in ("", "of another clock")])
 
 
+def constants(_draw: Random) -> Iterator[str]:
+    """Show the tables of numbers that the package's declarations leave out."""
+    yield from (f"{shown(cones)} {shown(delays)}" for cones, delays in sonar.STEPS)
+    yield shown(rounding._DEVIATIONS)
+
+
 def example_drives(_draw: Random) -> Iterator[str]:
     """Draw robots and the ways that they are driven, record short drives, and write all that an example has."""
     for seed in range(6):
@@ -259,7 +265,7 @@ def example_drives(_draw: Random) -> Iterator[str]:
 
 
 TRACES: dict[str, Trace] = {
-    "examples": example_drives,
+    "constants": constants, "examples": example_drives,
     "fits": fits, "ramped": ramped, "squares": squares, "echoes": echoes, "readings": readings, "shifted": shifted,
     "declared": declared_of("robot_bench.experiments.fitting"),
 }  # fmt: skip

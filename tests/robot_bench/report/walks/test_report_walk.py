@@ -18,6 +18,7 @@ from robot_bench.events.kinds import Contact, Event, Packet, PinEdge, Wave, Worl
 from robot_bench.recording.run_record import RunRecord, record_of
 from robot_bench.recording.summary import outcome_of, outcome_of_all, verdict
 from robot_bench.report import drawn, measures
+from robot_bench.report import plan as report_plan
 from robot_bench.report.drawn import drawn_of
 from robot_bench.report.make import Files, make_artefacts, make_artefacts_of_all
 from robot_bench.report.page_of_all import report_of_all
@@ -232,7 +233,24 @@ def folders(draw: Random) -> Iterator[str]:
     yield said(draw.random())
 
 
+def labels(_draw: Random) -> Iterator[str]:
+    """Write names on things as wide and as high as they are, or by a pixel less or more, with a path under them."""
+    for text in ("a", "abcd"):
+        width, height = report_plan.LETTER_PX * len(text), report_plan.LINE_PX
+        for across in (width / 3, width / 2 - 0.5, width / 2, width / 2 + 0.5, width):
+            for along in (height / 3, height / 2 - 0.5, height / 2, height / 2 + 0.5, height):
+                for place in ((0.0, 0.0), (-1.9, 0.0), (1.9, 1.9)):
+                    for path in ((), ((9, 9), (10, 10)), [(x, y) for x in range(30) for y in range(30)]):
+                        sheet = report_plan._Sheet((-2.0, -2.0, 2.0, 2.0), 200.0, path={*path})
+                        found: list[Json] = []
+                        for _ in range(2):  # the second has to make room for the first
+                            report_plan._add(found, sheet, text, place, (across, along), {})
+                        report_plan._add(found, sheet, text, place, across, {"kind": "mark"})
+                        yield said([text, across, along, place, len(path), found, sheet.boxes])
+
+
 TRACES = {
+    "labels": labels,
     "plans": plans, "latencies": latencies, "crowds": crowds, "folders": folders, "pages": pages,
 }  # fmt: skip
 test_what_reports_show_is_what_was_approved = judge_of(__file__, TRACES)

@@ -11,6 +11,7 @@ from typing import Any
 from bluepill_sim.core import Watchpoint
 from bluepill_sim.program.line_table import read_lines
 from bluepill_sim.program.variables import read_variables
+from p2os.view.run_control import RunCommand
 from robot_bench.bench import Bench
 from robot_bench.cli.debugging.future import Future
 from robot_bench.cli.debugging.gdb_beside import GdbBeside
@@ -21,6 +22,7 @@ from robot_bench.scenario.loading import load_scenario
 from simbase.errors import UsageError
 from simbase.timing import NS_PER_MS
 from tests.robot_bench.running.test_run_control import Controlled, Listener, scenario
+from tests.tools.suite.acted import Acted, taken
 from tests.tools.suite.approved import Trace, judge_of, said, tried
 from tests.tools.suite.declared import declared_of
 
@@ -245,7 +247,41 @@ def resumed(_draw: Random) -> Iterator[str]:
             yield said([pc, is_over, future._hits, seen, sorted(engine.breakpoints), sorted(engine.watchpoints)])
 
 
+def hands(_draw: Random) -> Iterator[str]:
+    """Do something by hand at a time or now, in a future whose past is known or not, running or standing."""
+    for at_ns in (None, 7):
+        for is_past in (False, True):
+            for is_running in (False, True):
+                for does in ("drive 0.1 0", "let go", "type go", ""):
+                    calls: list[str] = []
+                    chosen: Any = Acted(calls, "chosen")
+                    chosen.is_past, chosen.now_ns, chosen.hands = is_past, 9, ()
+                    run: Any = Acted(calls)
+                    run.is_running, run._chosen, run._speeds, run.holds = (
+                        is_running,
+                        chosen,
+                        "as before",
+                        Acted(calls, "holds"),
+                    )
+                    ended = tried(RunSession._hand, run, RunCommand(do="hand", words=does, at_ns=at_ns))
+                    yield said([at_ns, is_past, is_running, does, ended, run._speeds]) + taken(calls).replace(
+                        " object", ""
+                    )
+
+
+def places(_draw: Random) -> Iterator[str]:
+    """Halt no more at a place, which may be gone."""
+    for number in (1, 2, 3):
+        calls: list[str] = []
+        run: Any = SimpleNamespace(_points={1: "a", 2: "b"}, _counts={1: 5, 2: 6}, _armed="armed",
+                                   _chosen=Acted(calls, "chosen"))  # fmt: skip
+        ended = tried(RunSession._halt_not_at, run, RunCommand(do="halt", number=number))
+        yield said([number, ended, run._points, run._counts, taken(calls)])
+
+
 TRACES: dict[str, Trace] = {
+    "places": places,
+    "hands": hands,
     "resumed": resumed,
     "paces": paces,
     "words": words,

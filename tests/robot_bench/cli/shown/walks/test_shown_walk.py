@@ -21,7 +21,7 @@ from p2os.view.targets import ViewPanel
 from robot_bench.bench import Bench
 from robot_bench.cli import run as run_verb
 from robot_bench.cli.debugging.hands import hand_of
-from robot_bench.cli.shown import chip_panels, live_target, lone_board, saved_hands
+from robot_bench.cli.shown import chip_panels, live_target, lone_board, saved_hands, targets
 from robot_bench.cli.shown.fleet_hands import FleetHands
 from robot_bench.cli.shown.live_fleet import LiveFleet
 from robot_bench.cli.shown.live_run import BenchBuilt, BenchReleased, Happened, LiveRun
@@ -356,7 +356,34 @@ def held_targets(_draw: Random) -> Iterator[str]:
                             yield f"interrupted {taken(calls)}"
 
 
+def looked(_draw: Random) -> Iterator[str]:
+    """Count what has run anew at each look of a small program, and more seldom of a larger one; collect no garbage."""
+    for size in (0, 2999, 3000, 9000, 20_000):
+        counts: list[int] = []
+        counted = SimpleNamespace(of_board=lambda *_, counts=counts: counts.append(1))
+        board: Any = SimpleNamespace(entered_blocks={1}, gone_ways=set(), image=SimpleNamespace(name="a/b.elf"))
+        with (
+            mock.patch.object(chip_panels, "Coverage", counted),
+            mock.patch.object(chip_panels, "program_lines", lambda *_, size=size: {
+                "files": [], "functions": [["f", 0, size // 2], ["g", 0, size - size // 2]]}),
+        ):  # fmt: skip
+            program = chip_panels._RunningProgram(board)
+            for number in range(24):
+                board.entered_blocks = {*range(number)}
+                counts.append(len(program.lines["functions"]))  # type: ignore[arg-type]  # a list
+        yield said([size, counts])
+    calls: list[str] = []
+    for was_enabled in (True, False):
+        with (
+            mock.patch.object(targets, "gc", Acted(calls, "gc", isenabled=[was_enabled])),
+            targets._without_collecting(),
+        ):
+            calls.append("inside")
+        yield said([was_enabled, taken(calls)])
+
+
 TRACES = {
+    "looked": looked,
     "held": held, "held targets": held_targets,
     "panels": panels, "hands": hands, "live": live, "fleet": fleet, "fleet_hands": fleet_hands, "looks": looks,
     "declared": declared_of("robot_bench.cli.shown"),
