@@ -1,4 +1,4 @@
-"""The verb of campaigns, whose runs are made up: who works on them, what is told meanwhile, and what is printed."""
+"""The verb of campaigns, whose runs are made up: who works on them, what is reported meanwhile, and what is printed."""
 
 import contextlib
 import io
@@ -81,8 +81,8 @@ def verbs(_draw: Random) -> Iterator[str]:
             yield verb._seen_from(Path(path), Path(one))
 
 
-def told(_draw: Random) -> Iterator[str]:
-    """Tell how a campaign goes: a line each tenth where there is no terminal, none where there is one."""
+def reported_meanwhile(_draw: Random) -> Iterator[str]:
+    """Report how a campaign goes: a line each tenth where there is no terminal, none where there is one."""
     for runs in (40, 7):
         for is_terminal in (False, True):
             err, bars = io.StringIO(), list[object]()
@@ -141,5 +141,5 @@ def printed_wholes(draw: Random) -> Iterator[str]:
     yield tried(verb._refuse_dask, "local", "x")
 
 
-TRACES: dict[str, Trace] = {"verbs": verbs, "told": told, "printed": printed_wholes}
+TRACES: dict[str, Trace] = {"verbs": verbs, "reported": reported_meanwhile, "printed": printed_wholes}
 test_what_the_verb_of_campaigns_shows_is_what_was_approved = judge_of(__file__, TRACES)
