@@ -133,9 +133,9 @@ class CanNetwork(Stateful):
 
     @property
     def now_ns(self) -> Nanos:
-        """The time that the first of the chips has reached; without chips, when the bus is free."""
+        """The latest time that a chip has reached; without chips, when the bus is free."""
         times = [member.now_ns for member in self._members if member.now_ns is not None]
-        return max((time for time in times if time is not None), default=self._free_ns)
+        return max(times, default=self._free_ns)
 
     @property
     def next_ns(self) -> Nanos | None:

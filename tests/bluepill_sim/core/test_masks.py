@@ -71,12 +71,13 @@ def test_faultmask_is_cleared_by_the_return_from_a_handler(run) -> None:
 def test_bits_that_do_not_exist_are_not_kept_by_msr(run, core, monkeypatch) -> None:
     monkeypatch.setenv("P2OS_CORE", core)
     machine = run(
-        "mov32 r1, #0xFF\nmsr basepri, r1\nmrs r0, basepri\nlog r0\nmovs r1, #0\nmsr basepri, r1\n"
+        "movs r1, #255\nmsr basepri, r1\nmrs r0, basepri\nlog r0\n"
+        "movs r1, #15\nmsr basepri, r1\nmrs r0, basepri\nlog r0\n"
         "mov32 r1, #0x20003003\nmsr psp, r1\nmrs r0, psp\nlog r0\n"
         "mov32 r1, #0x20004ffe\nmsr msp, r1\nmrs r0, msp\nlog r0\nmov r0, sp\nlog r0\n"
         "movs r1, #2\nmsr control, r1\nisb\nmov r0, sp\nlog r0\nmov32 r1, #0x20002001\nmsr psp, r1\nmov r0, sp\nlog r0"
     )
-    assert machine.log == [0xF0, 0x2000_3000, 0x2000_4FFC, 0x2000_4FFC, 0x2000_3000, 0x2000_2000]
+    assert machine.log == [0xF0, 0, 0x2000_3000, 0x2000_4FFC, 0x2000_4FFC, 0x2000_3000, 0x2000_2000]
 
 
 @pytest.mark.parametrize("core", ["python", "native"])

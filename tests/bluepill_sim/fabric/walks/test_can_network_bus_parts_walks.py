@@ -117,7 +117,8 @@ def _walk(
             network.run(chips, now)  # type: ignore[arg-type]
         else:
             for chip in chips:
-                chip.now_ns = None if chip.now_ns is None else max(chip.now_ns, now)
+                behind = draw.choice((0, 0, 15_000))
+                chip.now_ns = None if chip.now_ns is None else max(chip.now_ns, now - behind)
             network.advance_to(now)
         state = [(node.waiting, node.errors, node.received[-2:], node.snapshot()["_coming"]) for node in nodes]
         kept = {name: value for name, value in network.snapshot().items() if name != "_parts"}
