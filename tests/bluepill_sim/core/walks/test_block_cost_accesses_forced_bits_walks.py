@@ -95,6 +95,19 @@ def _blocks(_: random.Random) -> Iterator[str]:
         yield _shown(_code(*(filled(row, dice) for row in rows)), dice.choice((FLASH, FLASH + 2, FLASH + 4, FLASH + 6)))
 
 
+def _its(_: random.Random) -> Iterator[str]:
+    """Yield whether code may end inside each IT block: some instructions behind it, short, long or half of one."""
+    dice = random.Random("IT")
+    for mask in range(16):
+        found = []
+        for count in range(6):
+            for _number in range(8):
+                behind = [dice.choice((0x1C49, 0xE7FE, 0x18E8, 0xF8D1_2004, 0xEA41_01E8)) for _ in range(count)]
+                code = _code(0xBF00 | dice.randrange(14) << 4 | mask, *behind)
+                found += [may_end_in_it(code), may_end_in_it(code[:-2]), may_end_in_it(_code(0xBF00) + code)]
+        yield f"{mask:x} {''.join(f'{one:d}' for one in found)}"
+
+
 def _instruction(dice: random.Random) -> int:  # noqa: C901, PLR0911 - one return a kind
     """Return an instruction on a few registers, such as programs change registers with."""
     target, first, second = (dice.choice((1, 2, 2, 3)) for _ in range(3))
@@ -195,5 +208,5 @@ def _stores(_: random.Random) -> Iterator[str]:
         yield f"{code.hex()} {bits:x} { ({f'{place:x}': f'{value:x}' for place, value in seen.items()}) } {others}"
 
 
-TRACES = {"encodings": _encodings, "branches": _branches, "blocks": _blocks, "stores": _stores}
+TRACES = {"encodings": _encodings, "branches": _branches, "blocks": _blocks, "ITs": _its, "stores": _stores}
 test_a_walk_shows_what_was_approved = judge_of(__file__, TRACES)

@@ -132,7 +132,10 @@ def _sweep(_: random.Random) -> Iterator[str]:
                 for key, word in ((_DEMCR, 0x0100_0000), (_LAR, 0xC5AC_CE55)) if has_trace else ():
                     bus.write(key, 4, word)
                 shared.cfsr = shared.hfsr = shared.dfsr = 0xFFFF_FFFF
-                known = f"{bus.system.is_modelled(offset):d}{bus.system.is_open_to_all(offset):d}"
+                known = "".join(
+                    f"{bus.system.is_modelled(byte):d}{bus.system.is_open_to_all(byte):d}"
+                    for byte in range(offset, offset + 4)
+                )
                 line = f"{address:x} {known} {bus.read(address)}"
                 for word in (0xFFFF_FFFF, 0, 0xA5A5_A5A5, 0x5A5A_5A5A):
                     if address == _AIRCR and word >> 16 == 0x05FA:

@@ -36,43 +36,50 @@ from tests.bluepill_sim.fabric.test_pins import Ports
 from tests.tools.suite.approved import Trace, judge_of, said, tried
 
 WORD = 0xFFFF_FFFF
+#: Declarations of a register, most of them wrong.
+DECLARED: tuple[dict[str, Any], ...] = (
+    {},
+    {"offset": 2},
+    {"offset": 4, "reset": 5, "readable": 4},
+    {"readable": 1 << 32},
+    {"readable": WORD, "reset": WORD},
+    {"reset": 1 << 32},
+    {"writable": -2},
+    {"write_one_to_clear": 1},
+    {"writable": 0, "write_one_to_clear": 1, "write_zero_to_clear": 1},
+    {"writable": 0, "write_one_to_clear": 1, "write_zero_to_clear": 2},
+    {"triggers": 1},
+    {"readable": 0, "writable": 2, "triggers": 1},
+    {"readable": 2, "writable": 0, "triggers": 2},
+    {"mask": 0xFF},
+    {"mask": 0xFF, "readable": 1},
+    {"on_read": "look"},
+    {"on_read": "look", "on_write": "act"},
+    {"on_read": "look", "writable": 0},
+    {"on_read": "native"},
+    {"fields": "A 3:0, B 4"},
+    {"fields": "A 0:3"},
+    {"fields": "A 32"},
+    {"fields": "A 31"},
+    {"fields": "A 3:0, B 3"},
+    {"fields": "A 3, A 4"},
+    {"fields": "A"},
+    {"fields": "A 3:0", "readable": 0x1F},
+    {"fields": "A 3:0", "writable": 0x1F, "readable": 0xF},
+    {"fields": "A 3:0", "writable": 0, "write_one_to_clear": 0x10},
+    {"fields": "A 3:0", "writable": 0, "write_zero_to_clear": 0x10},
+    {"fields": "A 3:0", "triggers": 0x10},
+)
 
 
 def declarations(draw: random.Random) -> Iterator[str]:
-    for given in (
-        {},
-        {"offset": 2},
-        {"offset": 4, "reset": 5, "readable": 4},
-        {"readable": 1 << 32},
-        {"readable": WORD, "reset": WORD},
-        {"reset": 1 << 32},
-        {"writable": -2},
-        {"write_one_to_clear": 1},
-        {"writable": 0, "write_one_to_clear": 1, "write_zero_to_clear": 1},
-        {"writable": 0, "write_one_to_clear": 1, "write_zero_to_clear": 2},
-        {"triggers": 1},
-        {"readable": 0, "writable": 2, "triggers": 1},
-        {"readable": 2, "writable": 0, "triggers": 2},
-        {"mask": 0xFF},
-        {"mask": 0xFF, "readable": 1},
-        {"on_read": "look"},
-        {"on_read": "look", "on_write": "act"},
-        {"on_read": "look", "writable": 0},
-        {"on_read": "native"},
-        {"fields": "A 3:0, B 4"},
-        {"fields": "A 0:3"},
-        {"fields": "A 32"},
-        {"fields": "A 31"},
-        {"fields": "A 3:0, B 3"},
-        {"fields": "A 3, A 4"},
-        {"fields": "A"},
-        {"fields": "A 3:0", "readable": 0x1F},
-        {"fields": "A 3:0", "writable": 0x1F, "readable": 0xF},
-        {"fields": "A 3:0", "writable": 0, "write_one_to_clear": 0x10},
-        {"fields": "A 3:0", "writable": 0, "write_zero_to_clear": 0x10},
-        {"fields": "A 3:0", "triggers": 0x10},
-    ):
+    for given in DECLARED:
         yield tried(lambda each: said(Register(name="R", **{"offset": 0, **each})), given)
+    # Of two faults, which one is named first.
+    for one in DECLARED:
+        yield "".join(
+            tried(lambda each: said(Register(name="R", **{"offset": 0, **each})), one | two) for two in DECLARED
+        )
     for _ in range(60):
         writable = draw.getrandbits(8)
         one = draw.getrandbits(8) & ~writable
