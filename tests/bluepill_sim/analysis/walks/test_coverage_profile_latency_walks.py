@@ -117,7 +117,7 @@ def covered(draw: random.Random) -> Iterator[str]:
             refuse_without_lines, coverage, "a.elf"
         )
         page = coverage_page(coverage, title="a < b", sources=None)
-        yield page.replace(str(PROGRAM.parents[3]), "…")[:6000]
+        yield page.replace(str(PROGRAM.parents[3]), "…")
         named = [
             SimpleNamespace(
                 **{name: getattr(file, name) for name in ("functions", "branches", "ways", "lines", "lines_hit")},
