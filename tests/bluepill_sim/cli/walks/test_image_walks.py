@@ -1,12 +1,15 @@
 """What the recorder of a page makes of calls and of memory that changes between them, at random, as approved."""
 
 import ctypes
+import os
 import random
 from collections.abc import Callable, Iterator
 from typing import Any
 
+from bluepill_sim.cli.browser.document import chip_data
 from bluepill_sim.cli.browser.image import FUNCTIONS, Recording, _changed, _pointers, _renamed, _runs
 from bluepill_sim.extension import library as emulator
+from bluepill_sim.extension.library import CORE_VARIABLE
 from tests.tools.suite.approved import Trace, judge_of, said, tried
 
 BYTES = 160
@@ -110,5 +113,18 @@ def _recordings(_: random.Random) -> Iterator[str]:
         yield "\n".join([*done, said(recording.sizes), said(recording.steps)])
 
 
-TRACES: dict[str, Trace] = {"stretches": _stretches, "recordings": _recordings}
+def _page(_: random.Random) -> Iterator[str]:
+    """Yield what a page is given to make a chip of: which functions are called, each name, and where it stands.
+
+    What stands in the memory of C changes with each structure of it, and is left out.
+    """
+    data = chip_data()
+    called = [step[1] for step in data["steps"] if step[0] == "call"]
+    for name, value in sorted((data | {"sizes": len(data["sizes"]), "steps": called}).items()):
+        rows = value.items() if isinstance(value, dict) else value if isinstance(value, list) else [value]
+        yield "\n".join([f"{name} {len(rows)}", *map(said, rows)])
+    yield said([chip_data() == data, os.environ.get(CORE_VARIABLE, "none")])
+
+
+TRACES: dict[str, Trace] = {"stretches": _stretches, "recordings": _recordings, "page": _page}
 test_a_walk_shows_what_was_approved = judge_of(__file__, TRACES)
