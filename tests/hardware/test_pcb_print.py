@@ -29,6 +29,11 @@ def test_print_lands_and_wires_of_each_board_are_right(variant: str) -> None:
     assert lands.faults(board(variant), build(variant)) == []
 
 
+def test_a_part_of_the_circuit_that_is_not_on_the_board_is_named() -> None:
+    without = dataclasses.replace(board(), parts={ref: part for ref, part in board().parts.items() if ref != "J1"})
+    assert "J1 is not on the board" in lands.faults(without, build())
+
+
 def with_part(ref: str, **changes: object) -> PrintedBoard:
     part = dataclasses.replace(board().parts[ref], **changes)  # type: ignore[arg-type]
     return dataclasses.replace(board(), parts={**board().parts, ref: part})

@@ -106,11 +106,11 @@ TESTS_OF_C = {
           for name in ("random_registers", "registers", "timers", "dma", "streams")),
         "tests/bluepill_sim/peripherals/sequences", "tests/bluepill_sim/peripherals", "tests/bluepill_sim/native"),
     "bluepill_sim/extension/source/interpreter": (
+        *(f"tests/bluepill_sim/core/interpreter/test_{name}.py"
+          for name in ("against_unicorn", "tidy", "memory_bounds", "hooks", "blocks_decode", "special")),
         *PROGRAM_WALKS,
         *(f"tests/bluepill_sim/core/interpreter/test_{name}.py"
-          for name in ("tidy", "memory_bounds", "hooks", "blocks_decode", "special", "continued", "against_unicorn",
-                       "exact", "own_core")),
-        "tests/bluepill_sim/core/interpreter/test_heap.py",
+          for name in ("continued", "exact", "own_core", "heap")),
         "tests/bluepill_sim/core/interpreter", "tests/bluepill_sim/core/test_kernels.py",
         "tests/bluepill_sim/core/test_flag_vectors.py", "tests/bluepill_sim/native/test_native_core.py",
         "tests/bluepill_sim/core", "tests/bluepill_sim/native"),

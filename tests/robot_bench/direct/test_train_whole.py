@@ -45,3 +45,10 @@ def test_a_motor_aims_at_rest_where_friction_is_stronger(speed: float) -> None:
     aim, _ = train.aims(Shares(0, 0, 1), Shares(0, 0, 0), 7.4)
     assert aim.rate_radps == 0.0
     assert aim.torque_nm > 0.0
+
+
+@pytest.mark.parametrize(("dropped", "left"), [(0.0, 1.0), (0.25, 0.75), (1.0, 0.0), (1.1, 0.0)])
+def test_a_bridge_that_drops_a_part_of_the_volts_takes_it_from_the_fastest_speed(dropped: float, left: float) -> None:
+    whole = rover(bridge={"drop_v": 0.0})
+    robot = rover(bridge={"drop_v": dropped * whole.battery.full_v})
+    assert no_load_radps(robot) == pytest.approx(left * no_load_radps(whole))

@@ -57,6 +57,13 @@ def test_the_dimensionless_jerk_depends_neither_on_speed_nor_on_span() -> None:
     assert once.log_dimensionless_jerk == pytest.approx(longer.log_dimensionless_jerk, abs=0.05)
 
 
+def test_three_speeds_have_a_jerk_and_two_have_none() -> None:
+    for count in (3, 4):  # places, one more than speeds
+        x = np.array([0.0, 1.0, 3.0, 7.0])[:count]
+        found = metrics(drive(Trajectory(0.1 * np.arange(count), x, np.zeros(count), np.zeros(count))))
+        assert (found.mean_square_jerk_m2_s6 is None) == (count < 4)
+
+
 def test_a_robot_that_stands_half_of_the_time_is_said_to() -> None:
     found = metrics(drive(line(lambda at: 0.3 if at < 2 else 0.0)))
     assert found.standing_share == pytest.approx(0.5, abs=0.02)

@@ -1,7 +1,7 @@
 """The interpreter does what Unicorn does: single instructions of each encoding, sequences, IT blocks."""
 
 import random
-from itertools import combinations, islice
+from itertools import combinations, islice, product
 from typing import Any
 
 import pytest
@@ -41,6 +41,17 @@ def assert_same(lockstep: Lockstep, cases: list[Case]) -> None:
 def test_each_encoding_does_what_it_does_on_unicorn(lockstep: Lockstep, each: int) -> None:
     dice = random.Random(38 + each)
     assert_same(lockstep, [made(dice, [row]) for row in ROWS for _ in range(each)])
+
+
+def test_shifts_by_a_register_are_unicorns_for_every_amount(lockstep: Lockstep) -> None:
+    """LSL, LSR, ASR and ROR of R1 by R2 into R1, as T1 and as T2 with and without flags: about 0, 32 and 256."""
+    shifts = [*(0x4011 | number << 6 for number in (2, 3, 4, 7)), *(0xFA01_F102 | n << 20 for n in range(8))]
+    amounts = (0, 1, 2, 30, 31, 32, 33, 34, 63, 64, 65, 127, 128, 254, 255, 256, 257, 0x8000_001F)
+    cases = [
+        Case((shift,), (0, value, amount, *(0,) * 10, 0x2000_0400, 0), carry << 29)
+        for shift, value, amount, carry in product(shifts, (0x8000_0001, 0xC000_0000, 0x7FFF_FFFE), amounts, (0, 1))
+    ]
+    assert_same(lockstep, cases)
 
 
 def with_fields(row: Encoding, dice: random.Random, **fixed: int) -> Case | None:
