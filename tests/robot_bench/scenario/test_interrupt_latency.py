@@ -8,6 +8,8 @@ import pytest
 from robot_bench.campaign.trial import TrialVerdict, run_trial, trial_of
 from robot_bench.run import run_scenario
 from robot_bench.scenario.loading import load_scenario
+from robot_bench.wires.power_up import power_up
+from simbase.timing import NS_PER_MS
 
 SETTINGS = (("body", "kinematic"), ("duration_s", 1))
 
@@ -19,6 +21,20 @@ def test_a_latency_makes_another_run_that_comes_again_by_its_seed(monkeypatch: p
     hashes = [run_trial(one).sha256 for one in (base, late, late, late.set(("seed", 1)))]
     assert hashes[1] == hashes[2]
     assert len(set(hashes)) == 3
+
+
+def test_the_seed_draws_how_late_each_interrupt_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("P2OS_CORE", "exact")
+    program = load_scenario("rover").firmware
+
+    def places(seed: int) -> list[int]:
+        board, found = power_up(program, latency_cycles=1000, seed=seed), []
+        for at in range(1, 2000):
+            board.advance_to(at * NS_PER_MS // 200)
+            found.append(board.pc)
+        return found
+
+    assert places(1) == places(1) != places(2)
 
 
 def test_the_record_holds_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
