@@ -18,7 +18,7 @@ from bluepill_sim.analysis.edge_log import EdgeLog
 from bluepill_sim.extension.library import core_chosen
 from tests.bluepill_sim.machine import COUNTER_ON, PORT_A_OUT, Machine, listen
 from tests.tools.forked_python import forked_python
-from tests.whole.failing_calls import Kind, Outcome, library, page_in
+from tests.whole.failing_calls import library
 
 LIBC = ctypes.CDLL(None) if hasattr(ctypes.CDLL(None), "mallinfo2") else None
 #: The smallest piece of a heap takes 32 bytes; seven that were given back before may still count as in use.
@@ -51,15 +51,16 @@ b again
 #: first, the second, and so on up to one that it never comes to. Prints what happened, and R0, of each run.
 REFUSED = """
 import ctypes, json, sys
+from pathlib import Path
 from tests.bluepill_sim.core.interpreter.test_blocks_decode import ADD_ONE, BKPT, NOP, SRAM, Board, InterpreterCore
-page, (kinds, kind, outcome, most) = sys.argv[1], map(int, sys.argv[2:])
+from tests.whole.failing_calls import Kind, Outcome, page_in
 calls = ctypes.CDLL(None)
-for number in range(1, most + 1):
+for number in range(1, int(sys.argv[2]) + 1):
     board = Board(InterpreterCore)
     board.put(SRAM, ADD_ONE, NOP, ADD_ONE, BKPT)
-    with open(page, "r+b") as counts:
-        counts.write(bytes(8 * kinds))
-    calls.failing_calls_arm(page.encode(), kind, ctypes.c_long(number), outcome)
+    folder = Path(sys.argv[1], str(number))
+    folder.mkdir()
+    calls.failing_calls_arm(str(page_in(folder)).encode(), Kind.MALLOC, ctypes.c_long(number), Outcome.FAIL)
     seen = [board.run(SRAM) for _ in range(3)]
     board.put(SRAM, ADD_ONE, ADD_ONE, ADD_ONE, BKPT, drops=False)
     print(json.dumps([*seen, board.run(SRAM)]))
@@ -149,9 +150,8 @@ def test_without_memory_code_in_sram_runs_as_ever_or_a_fetch_fails(
 ) -> None:
     """What no memory was for is asked for again at the next run; code that could not be copied is decoded anew."""
     allocations = 6
-    words = [*map(str, (page_in(tmp_path), len(Kind), int(Kind.MALLOC), int(Outcome.FAIL), allocations + 1))]
     done = subprocess.run(
-        [forked_python(library(tmp_path_factory)), "-c", REFUSED, *words],
+        [forked_python(library(tmp_path_factory)), "-c", REFUSED, str(tmp_path), str(allocations + 1)],
         capture_output=True, text=True, check=False, timeout=60,
     )  # fmt: skip
     assert (done.returncode, done.stderr) == (0, "")
